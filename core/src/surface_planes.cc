@@ -15,14 +15,13 @@
 
 namespace partiemc {
 
-CopiedBox CopiedBoxOf(const SurfaceParameters& parameters, const LiftedFrame& lifted) {
+CopiedBox CopiedBoxOf(double radius, const LiftedFrame& lifted) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   CopiedBox box;
   box.has_copies = lifted.percolates;
   std::array<double, 3> low, high, least, most;
   low.fill(-kInfinity), least.fill(-kInfinity);
   high.fill(kInfinity), most.fill(kInfinity);
-  const double radius = parameters.kernel_radius * parameters.spacing;
   for (std::size_t k = 0; k < 3; ++k) {
     if (!lifted.percolates[k]) continue;
     box.any = true;

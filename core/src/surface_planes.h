@@ -24,9 +24,9 @@ struct PlaneCuts {
   space::SurfacePieces pieces;
 };
 
-/// Copies of particles reach kCopyMargin kernel radii beyond the faces of a periodic box, at most
-/// one length of the box. A body that stays kCopyEnd kernel radii away from the end of the copies
-/// does not depend on it.
+/// Copies of particles reach kCopyMargin kernel radii (of the largest particle) beyond the faces of
+/// a periodic box, at most one length of the box. A body that stays kCopyEnd kernel radii away from
+/// the end of the copies does not depend on it.
 inline constexpr double kCopyMargin = 6, kCopyEnd = 2;
 
 /// The periodic box of a frame with copies. Infinite along axes without copies. World units.
@@ -39,7 +39,8 @@ struct CopiedBox {
   std::array<bool, 3> has_copies{};
 };
 
-CopiedBox CopiedBoxOf(const SurfaceParameters& parameters, const LiftedFrame& lifted);
+/// `radius`: the largest kernel radius, world units.
+CopiedBox CopiedBoxOf(double radius, const LiftedFrame& lifted);
 
 /// Mirror images reach kImageRadii kernel radii behind walls. So F is exact up to one radius behind
 /// them, as smoothing near a wall requires. Particles up to kWallTolerance spacings behind a wall

@@ -235,11 +235,6 @@ SurfaceReconstructor::SurfaceReconstructor(const SurfaceParameters& parameters,
 absl::StatusOr<SurfaceReconstructor> SurfaceReconstructor::Create(
     const SurfaceParameters& parameters, const FrameLimits& limits) {
   if (absl::Status status = Validate(InSpace(parameters)); !status.ok()) return status;
-  if (parameters.box && parameters.sizes == Sizes::kOwn) {
-    return ViolationError(absl::StatusCode::kInvalidArgument,
-                          {std::string(kReasonOutOfRange), "parameters.sizes", "own",
-                           "must be equal with a periodic box"});
-  }
   if (parameters.box) {
     absl::Status status = Validate(*parameters.box, parameters.kernel_radius, parameters.spacing);
     if (!status.ok()) return status;
@@ -313,20 +308,27 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     return InStage(control.observer, stage, run);
   };
   Scale scale;
+  SizeRange sizes;
   Doubts doubts;
   absl::Status status = in_stage(Stage::kBins, [&] {
     absl::Status checked = CheckFrame(given, in_space_, limits_, b.distinct_ids);
     if (checked.ok() && state != nullptr) checked = CheckCellSize(*state, cell_size);
     if (!checked.ok() || frame.ParticleCount() == 0) return checked;
+    if (parameters_.sizes == Sizes::kOwn) {
+      // Before copies are added, so that errors name a given particle.
+      const auto range = RangeOfSizes(given, in_space_, {.spacing = h, .cell_size = cell_size});
+      if (!range.ok()) return range.status();
+      sizes = *range;
+    }
     if (parameters_.box) {
       constexpr std::array kAxes = {0, 1, 2};
-      checked = CheckBoxLengths(parameters_.box, *framed.box, parameters_.kernel_radius, h);
+      checked = CheckBoxLengths(parameters_.box, *framed.box, parameters_.kernel_radius, h, sizes);
       if (!checked.ok()) return checked;
       checked = Lift({.frame = framed,
                       .box = *framed.box,
                       .axes = kAxes,
-                      .range = 2 * parameters_.kernel_radius * h,
-                      .margin = kCopyMargin * parameters_.kernel_radius * h,
+                      .range = 2 * parameters_.kernel_radius * h * sizes.Reach(),
+                      .margin = kCopyMargin * parameters_.kernel_radius * h * sizes.Reach(),
                       .wraps = framed.box->wraps,
                       .reserve =
                           [&](std::uint64_t bytes) {
@@ -335,7 +337,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                           }},
                      b.lift, lifted);
       if (!checked.ok()) return checked;
-      copied = CopiedBoxOf(parameters_, lifted);
+      copied = CopiedBoxOf(parameters_.kernel_radius * h * sizes.Reach(), lifted);
       size.particles = frame.ParticleCount();
       size.box_axes = static_cast<std::uint64_t>(std::ranges::count(copied.has_copies, true));
     }
@@ -357,13 +359,8 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     b.virtual_plane.volumes.clip =
         copied.any ? std::optional(copied.faces) : SpaceBeforeWalls(parameters_);
     b.virtual_plane.volumes.clips_images = copied.any;
-    SizeRange sizes;
     absl::StatusOr<double> lightest = h * h * h;
-    if (parameters_.sizes == Sizes::kOwn) {
-      const auto range = RangeOfSizes(frame, in_space_, {.spacing = h, .cell_size = cell_size});
-      if (!range.ok()) return range.status();
-      sizes = *range;
-    } else {
+    if (parameters_.sizes == Sizes::kEqual) {
       lightest = LightestVolume(given, *lightest, doubts);
       if (!lightest.ok()) return lightest.status();
     }

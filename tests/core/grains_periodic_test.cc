@@ -1,4 +1,4 @@
-// Grains in periodic boxes: outlines are those of the same packings in the middle of the box.
+// Grains in periodic boxes: a packing has the same outline across a face and in the middle.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -173,7 +173,7 @@ TEST(GrainsPeriodic, AnyNumberOfThreadsGivesTheSameBits) {
   EXPECT_EQ(results[2], results[0]);
 }
 
-// Their kernels are smaller than those of the bulk.
+// Kernels of grains are smaller than kernels of the bulk.
 TEST(GrainsPeriodic, BoxesAreAtLeastFourKernelRadiiOfTheLargestGrain) {
   EXPECT_TRUE(Validate(GrainsIn(BoxOf(6.4, 6.4))).ok());
   EXPECT_EQ(FindViolation(Validate(GrainsIn(BoxOf(6.39, 7))))->field, "parameters.box.x.length");

@@ -1,5 +1,5 @@
-// Particles of different sizes in periodic boxes: outlines are those of the same bodies in the
-// middle of the box, and every result keeps its guarantees.
+// Particles of different sizes in periodic boxes: a body has the same outline across a face and in
+// the middle of the box, and every result keeps its guarantees.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -178,7 +178,7 @@ TEST(SizesPeriodic, SpacingIsEstimatedFromTheSizes) {
   EXPECT_NEAR(across.statistics.area, expected.statistics.area, 1e-3 * expected.statistics.area);
 }
 
-// A layer is cut at the faces. Its area is that of its particles, wherever the face lies.
+// A layer is cut at the faces. It has the area of its particles, wherever the face lies.
 TEST(SizesPeriodic, LayerIsCutAnywhereWithItsArea) {
   const double volume = SumOfVolumes(SizedWave());
   std::optional<double> perimeter;

@@ -85,16 +85,18 @@ INSTANTIATE_TEST_SUITE_P(Placements, WarmSurface,
 
 // A layer that percolates, with a drop and lone particles; then without the layer, so that nothing
 // is copied or cut unless the box wraps. Each frame has another box.
-class WarmPeriodicSurface : public testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(Wraps, WarmPeriodicSurface, testing::Bool(),
-                         testing::PrintToStringParamName());
+class WarmPeriodicSurface : public testing::TestWithParam<std::tuple<bool, Sizes>> {};
+INSTANTIATE_TEST_SUITE_P(Wraps, WarmPeriodicSurface,
+                         testing::Combine(testing::Bool(),
+                                          testing::Values(Sizes::kEqual, Sizes::kOwn)));
 
 TEST_P(WarmPeriodicSurface, AllocatesNothing) {
+  const auto [wraps, sizes] = GetParam();
   const SurfaceParameters parameters{
       .placement = SurfacePlacement::kVirtualPlane,
       .kernel_radius = 2,
-      .box =
-          PeriodicBox{.axes = {PeriodicAxis{0, 16}, PeriodicAxis{0, 12.5}}, .wraps = GetParam()}};
+      .sizes = sizes,
+      .box = PeriodicBox{.axes = {PeriodicAxis{0, 16}, PeriodicAxis{0, 12.5}}, .wraps = wraps}};
   const auto reconstructor = SurfaceReconstructor::Create(parameters);
   ASSERT_TRUE(reconstructor.ok());
   std::vector<std::vector<double>> frames;
@@ -109,7 +111,13 @@ TEST_P(WarmPeriodicSurface, AllocatesNothing) {
     }
     for (int p = 0; p < 60; ++p) xyz.push_back(random.Uniform(0, 30));
   }
-  const TrackedFrames tracked(frames);
+  std::vector<std::vector<float>> volumes(frames.size());
+  for (std::size_t k = 0; k < frames.size() && sizes == Sizes::kOwn; ++k) {
+    for (std::size_t p = 0; p < frames[k].size() / 3; ++p) {
+      volumes[k].push_back(p % 7 == 0 ? 2 : p % 5 == 0 ? .3f : 1);
+    }
+  }
+  const TrackedFrames tracked(frames, volumes);
   SurfaceWorkspace workspace;
   Surface surface;
   SurfaceState state;
@@ -121,7 +129,7 @@ TEST_P(WarmPeriodicSurface, AllocatesNothing) {
       frame.box = PeriodicBox{.axes = {PeriodicAxis{0, 16}, PeriodicAxis{.1 * k, 12.5 + .1 * k}}};
       const absl::Status status = reconstructor->Reconstruct(frame, state, workspace, surface);
       ASSERT_TRUE(status.ok()) << status;
-      ASSERT_EQ(surface.cuts.empty(), k == 3 && !GetParam());
+      ASSERT_EQ(surface.cuts.empty(), k == 3 && !wraps);
     }
   }
   EXPECT_EQ(allocations - before, 0u);

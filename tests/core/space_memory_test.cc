@@ -189,6 +189,7 @@ TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
     std::string name;
     std::vector<double> xyz;
     PeriodicBox box;
+    Sizes sizes = Sizes::kEqual;
   };
   support::Random random(6);
   const auto box = [](double x, double y, double z) {
@@ -217,7 +218,9 @@ TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
                              {"smallest box", lattice(12, 12, 12), box(12, 12, 12)},
                              {"column", lattice(6, 6, 60), box(0, 0, 60)},
                              {"columns", columns, box(0, 0, 12)},
-                             {"noise", noise, box(20, 20, 20)}};
+                             {"noise", noise, box(20, 20, 20)},
+                             {"sized layer", lattice(40, 40, 5), box(40, 40, 0), Sizes::kOwn},
+                             {"sized noise", noise, box(20, 20, 20), Sizes::kOwn}};
   for (Case tested : std::vector(cases)) {
     tested.name += ", wrapped";
     tested.box.wraps = true;
@@ -233,11 +236,15 @@ TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
          {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
           SurfacePlacement::kVirtualPlane}) {
       SCOPED_TRACE(absl::StrCat(tested.name, ", placement ", static_cast<int>(placement)));
-      const auto reconstructor =
-          SurfaceReconstructor::Create({.placement = placement, .box = tested.box});
+      const auto reconstructor = SurfaceReconstructor::Create(
+          {.placement = placement, .sizes = tested.sizes, .box = tested.box});
       ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
       const std::vector<std::vector<double>> frames = {tested.xyz};
-      const TrackedFrames tracked(frames);
+      std::vector<std::vector<float>> volumes(1);
+      for (std::size_t p = 0; p < tested.xyz.size() / 3 && tested.sizes == Sizes::kOwn; ++p) {
+        volumes[0].push_back(p % 7 == 0 ? 3 : p % 5 == 0 ? .3f : 1);
+      }
+      const TrackedFrames tracked(frames, volumes);
       const std::size_t before = live_bytes;
       peak_bytes = before;
       std::uint64_t told = 0;

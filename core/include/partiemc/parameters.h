@@ -186,8 +186,8 @@ struct ReconstructionParameters {
   /// With own sizes, a particle acts within `kernel_radius` times h_i, and smoothing follows the
   /// local size. Frames must have volumes. Except with grains, an absent spacing is estimated as
   /// the root mean square of the sizes. A size must be within a factor of `kMostSizeRatio` of the
-  /// spacing, and its kernel radius at most 32 cells. Excludes slices, walls, `noise_filter`,
-  /// Placement::kFarthestParticle, and for surfaces `box`.
+  /// spacing, and its kernel radius at most 32 cells. Excludes slices, walls, `noise_filter` and
+  /// Placement::kFarthestParticle.
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
 

@@ -196,9 +196,6 @@ absl::Status CheckSizes(const ReconstructionParameters& p) {
                            return section.slice.has_value();
                          });
   if (has_slice) return refused("for a slice");
-  if (p.box && p.output == Output::kSurface) {
-    return refused("for a surface with a periodic box");
-  }
   if (p.noise_filter) return refused("with a noise filter");
   if (!KeepsGuarantees(p.placement)) {
     return refused("for the placement " + std::string(Name(p.placement)));

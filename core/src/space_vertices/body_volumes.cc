@@ -132,20 +132,18 @@ void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodi
     const Vec3 origin = cell_size * LowestNodeOf(bricks, bodies.bodies[body]);
     const Vec3 a = positions[triangle[0]] - origin, b = positions[triangle[1]] - origin,
                c = positions[triangle[2]] - origin;
-    if (IsClipped(volumes, bodies, body)) {
-      const ClippedMeasure part = MeasureClipped(a, b, c, Relative(*volumes.clip, 1, origin));
-      volumes.measures[body].area += part.area;
-      volumes.measures[body].volume += part.volume;
-      continue;
-    }
-    double area = Length(Cross(b - a, c - a)) / 2;
+    const bool is_clipped = IsClipped(volumes, bodies, body);
+    const ClippedMeasure part =
+        is_clipped ? MeasureClipped(a, b, c, Relative(*volumes.clip, 1, origin))
+                   : ClippedMeasure{Length(Cross(b - a, c - a)) / 2, Dot(a, Cross(b, c)) / 6};
+    double area = part.area;
     if (!volumes.sizes.empty()) {
       area *= (volumes.SizeOf(triangle[0]) + volumes.SizeOf(triangle[1]) +
                volumes.SizeOf(triangle[2])) /
               3;
     }
     volumes.measures[body].area += area;
-    volumes.measures[body].volume += Dot(a, Cross(b, c)) / 6;
+    volumes.measures[body].volume += part.volume;
   }
   ShareMeasures(bodies, volumes);
 }

@@ -298,18 +298,11 @@ TEST(SpaceSizes, RefusesWhatHasNoOwnSizes) {
   parameters.sections = {{.slice = SlicePlane()}};
   EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
   parameters = own;
-  parameters.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
-  EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
-  parameters = own;
   parameters.noise_filter = .5;
   EXPECT_EQ(field_of(parameters), "parameters.sizes=own");
   parameters = own;
   parameters.boundary = Boundary::kGrains;
   EXPECT_EQ(field_of(parameters), "parameters.boundary=grains");
-  const auto created = SurfaceReconstructor::Create(
-      {.sizes = Sizes::kOwn, .box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}}});
-  ASSERT_TRUE(FindViolation(created.status()));
-  EXPECT_EQ(FindViolation(created.status())->field, "parameters.sizes");
 }
 
 }  // namespace
