@@ -26,7 +26,8 @@ Steps, by default all but the last:
               consumer of it
   consumer    tests/consumer finds and uses the installed project (after release)
   bench       no ratio of the benchmark is clearly worse than recorded (tests/bench)
-  includes    every source includes the headers it needs: without precompiled headers, each source alone
+  includes    every source of core, proto, server and client includes the headers it needs: it compiles
+              alone, without precompiled headers
 Builds are kept in build/, so a second run compiles changed files only.
 With CI=true a skipped test or step fails, unless tests/skips.txt names it with its reason.
 USAGE
@@ -249,7 +250,7 @@ step_fuzz() {
 step_includes() {
   check "includes: configure" cmake -S . -B build/includes -G Ninja -DCMAKE_CXX_COMPILER=clang++-14 \
     -DCMAKE_BUILD_TYPE=Debug -DPARTIEMC_UNITE=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
-    -DPARTIEMC_HDF5=OFF -DPARTIEMC_VTK=OFF &&
+    -DPARTIEMC_HDF5=ON -DPARTIEMC_VTK=ON -DPARTIEMC_C=ON -DPARTIEMC_PYTHON=ON &&
     check "includes: headers of messages" cmake --build build/includes -j "$jobs" \
       --target partiemc_proto partiemc_recording_proto partiemc_health_proto partiemc_rpc_proto \
       partiemc_relay_proto &&

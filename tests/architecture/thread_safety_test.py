@@ -4,7 +4,6 @@
 The sanitizer builds use Clang. This test runs Clang for the sources with a mutex that these builds leave
 out."""
 
-import itertools
 import json
 import os
 import pathlib
@@ -45,6 +44,18 @@ def sources():
     for name in listed:
         if name.endswith((".h", ".cc")) and (ROOT / name).is_file():
             yield name, re.sub("//.*", "", (ROOT / name).read_text())
+
+
+def compile_commands():
+    """The command of each source of this build by its name. Sources that are compiled together have one
+    command, of a file that includes them."""
+    commands = {}
+    for entry in json.loads((BUILD / "compile_commands.json").read_text()):
+        files = [entry["file"]]
+        if "/Unity/" in entry["file"]:
+            files = re.findall(r'^#include "(.+)"', pathlib.Path(entry["file"]).read_text(), re.MULTILINE)
+        commands.update((os.path.relpath(file, ROOT), entry) for file in files)
+    return commands
 
 
 PROGRAM = """
@@ -132,23 +143,16 @@ class ThreadSafety(unittest.TestCase):
         self.assertEqual(unused, set(GUARDS_NO_MEMBER))
 
     def test_sources_without_clang_builds_pass_the_check(self):
-        commands = {}
-        for entry in json.loads((BUILD / "compile_commands.json").read_text()):
-            file = pathlib.Path(entry["file"])
-            # Files that are compiled together are included by a file of the build.
-            folder = (file.relative_to(BUILD).parts if file.is_relative_to(BUILD)
-                      else file.relative_to(ROOT).parent.parts)
-            folder = itertools.takewhile(lambda part: part != "CMakeFiles", folder)
-            commands[pathlib.Path(*folder)] = entry
+        commands = compile_commands()
         texts = dict(sources())
-        for name, text in texts.items():
+        checked_sources = []
+        for name in sorted(commands.keys() & texts.keys()):
             own_header = texts.get(name.removesuffix(".cc") + ".h", "")
-            if not (name.startswith(WITHOUT_CLANG) and name.endswith(".cc")
-                    and re.search(r"\bMutex", text + own_header)):
+            if not (name.startswith(WITHOUT_CLANG) and re.search(r"\bMutex", texts[name] + own_header)):
                 continue
+            checked_sources.append(name)
             with self.subTest(name):
-                entry = next(commands[folder] for folder in pathlib.Path(name).parents
-                             if folder in commands)
+                entry = commands[name]
                 words = shlex.split(entry["command"])
                 flags = [word for word in words if word.startswith(("-I", "-D", "-std"))]
                 for word, following in zip(words, words[1:]):
@@ -157,6 +161,8 @@ class ThreadSafety(unittest.TestCase):
                     [COMPILER, *flags, "-fsyntax-only", "-Werror=thread-safety", ROOT / name],
                     cwd=entry["directory"], capture_output=True, text=True)
                 self.assertEqual(checked.returncode, 0, checked.stderr)
+        if "client/cli/main.cc" in commands:
+            self.assertIn("client/cli/replay/frame_feeder.cc", checked_sources)
 
     def test_thread_sanitizer_reports_real_races_only(self):
         guarded = self.compile("const MutexLock lock(mutex_);", "-O1", "-fsanitize=thread")
