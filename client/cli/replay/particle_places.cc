@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view kAxisNames = "xyz";
 
 // Number of particles of a frame, evenly selected, that are compared with the walls.
-constexpr std::size_t kMostTested = 10'000;
+constexpr std::size_t kMostTested = 1'000;
 
 double Length(const std::array<double, 3>& v) { return std::hypot(v[0], v[1], v[2]); }
 
@@ -122,12 +122,13 @@ void ParticlePlaces::CountBehindWalls(const RecordedFrame& frame) {
   if (2 * behind <= tested) return;
   const auto worst =
       std::ranges::max_element(counts, {}, [](const auto& entry) { return entry.second; });
-  behind_walls_ = Concat(
-      frame.source, ": ", behind == tested ? "all" : "most", " particles are behind a wall (",
-      worst->first, "), so they are not part of the fluid. The fluid is ",
-      worst->first.starts_with("--wall-plane")
-          ? "above --wall-plane, and below it with `below`"
-          : "on the left of --wall: a tank is counter-clockwise, an obstacle clockwise");
+  behind_walls_ =
+      Concat(frame.source, ": ", behind == frame.ParticleCount() ? "all" : "most",
+             " particles are behind a wall (", worst->first,
+             "), so they are not part of the fluid. The fluid is ",
+             worst->first.starts_with("--wall-plane")
+                 ? "above --wall-plane, and below it with `below`"
+                 : "on the left of --wall: a tank is counter-clockwise, an obstacle clockwise");
 }
 
 std::vector<std::string> ParticlePlaces::Warnings() const {

@@ -19,7 +19,8 @@ class ParticlePlaces {
  public:
   ParticlePlaces(const ReplayFlags& flags, const ReconstructionParameters& parameters);
 
-  /// Cost: one pass over the particles for each slice; at most 10,000 particles for the walls.
+  /// Cost: one pass over the particles for each slice; at most 1,000 particles
+  /// for each wall, times its points.
   void Add(const RecordedFrame& frame);
 
   /// One line for each such slice, and one for the first frame with most particles behind walls.

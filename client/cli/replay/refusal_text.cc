@@ -45,6 +45,17 @@ std::string RefusalText(const RecordedFrame& frame, std::span<const std::string>
       particle && *particle < frame.ParticleCount()) {
     return Concat(VolumeName(frame, *particle), rest);
   }
+  // "attributes[NAME][PARTICLE]" of a wrong phase.
+  rest = message;
+  if (const std::size_t end = rest.find(']');
+      rest.starts_with("attributes[") && end != std::string_view::npos) {
+    const std::string_view name = rest.substr(11, end - 11);
+    rest.remove_prefix(end + 1);
+    const auto particle = TakeIndex("", rest);
+    if (particle && *particle < frame.ParticleCount()) {
+      return Concat("attribute '", name, "' of ", ParticleName(frame, *particle), rest);
+    }
+  }
   rest = message;
   const auto attribute = TakeIndex("attributes", rest);
   const auto value = TakeIndex(".values", rest);
