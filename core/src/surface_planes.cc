@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
 #include "frame/wall_rules.h"
 #include "partiemc/status.h"
 #include "walls/wall_images.h"
@@ -50,9 +49,9 @@ absl::Status CheckWallsOf(const SurfaceParameters& parameters) {
   if (parameters.box) rule = "must be absent with a periodic box";
   if (parameters.sizes == Sizes::kOwn) rule = "must be absent unless sizes are equal";
   if (rule != nullptr) {
-    return ViolationError(absl::StatusCode::kInvalidArgument,
-                          {std::string(kReasonOutOfRange), "parameters.wall_planes",
-                           absl::StrCat(planes.size()), rule});
+    return ViolationError(
+        absl::StatusCode::kInvalidArgument,
+        {std::string(kReasonOutOfRange), "parameters.wall_planes", "present", rule});
   }
   return CheckWallPlanes(planes, parameters.kernel_radius, parameters.spacing);
 }

@@ -126,6 +126,8 @@ TEST(GrainsPeriodic, GrainsKeepTheirIdentitiesAcrossTheFaces) {
     }
     std::ranges::sort(identities);
     if (frame == 0) first = identities;
+    ASSERT_FALSE(identities.empty());
+    EXPECT_GT(identities.front(), 0u);
     EXPECT_EQ(identities, first);
   }
 }

@@ -238,19 +238,22 @@ TEST(SizesPeriodic, DropNearALayerIsWhole) {
 // Spray is measured by the areas of its particles, not by the spacing.
 TEST(SizesPeriodic, SprayCountsOwnAreas) {
   const PeriodicBox box = BoxOf(kSizedBoxWidth, 80);
-  Particles scene = SizedWave();
+  Particles scene = SizedWave(), drops;
   for (const auto& [x, size] : {std::pair(10.0, .5), {40.0, 1.4}}) {
-    scene.Add(x, 32);
-    scene.volumes.push_back(static_cast<float>(size * size));
+    for (Particles* particles : {&scene, &drops}) {
+      particles->Add(x, 32);
+      particles->volumes.push_back(static_cast<float>(size * size));
+    }
   }
   ReconstructionParameters parameters = SizedIn(box);
   EXPECT_EQ(ReconstructOnce(parameters, scene).rings.RingCount(), 3u);
-  // Without a layer, the box keeps and drops the same drops.
   parameters.min_component_area = .9;
   const Result kept = ReconstructOnce(parameters, scene);
   EXPECT_EQ(kept.rings.RingCount(), 2u);
   EXPECT_EQ(kept.statistics.dropped_spray, 1u);
   EXPECT_EQ(ParticlesOf(kept.rings), scene.size() - 1);
+  // Without a layer, nothing is cut, and the box keeps and drops the same drops.
+  EXPECT_EQ(ReconstructOnce(parameters, drops).rings.RingCount(), 1u);
 }
 
 class SizedDrift : public testing::TestWithParam<support::Known> {
@@ -422,7 +425,7 @@ TEST(SizesPeriodic, BoxesBelowFourKernelRadiiOfTheLargestParticleAreRefused) {
   ASSERT_TRUE(violation.has_value());
   EXPECT_EQ(violation->reason, kReasonOutOfRange);
   EXPECT_EQ(violation->field, "parameters.box.y.length");
-  RingStream stream(SizedIn(BoxOf(40, 40)));
+  EXPECT_THAT(violation->rule, testing::HasSubstr("for the largest particle"));
   Frame frame = scene.AsFrame();
   frame.box = BoxOf(35.9, 40);
   State state;

@@ -197,7 +197,7 @@ ReconstructionParameters HostileParameters(Choices& choices) {
     parameters.box->wraps = choices.Below(4) == 1;
   }
   if (choices.Below(4) == 1) parameters.noise_filter = HostileRatio(choices, 0, .5, 1);
-  if (!parameters.box && !parameters.noise_filter && choices.Below(4) == 1) {
+  if (!parameters.noise_filter && choices.Below(4) == 1) {
     parameters.sizes = Sizes::kOwn;
     if (choices.Below(2) == 1) parameters.boundary = Boundary::kGrains;
   }

@@ -68,7 +68,8 @@ def surface_to_meshio(surface, attributes=None):
 
 
 def to_svg(result, width=800):
-    """The text of an SVG picture: outline and mesh, `width` pixels wide. Surfaces are refused."""
+    """The text of an SVG picture: outline and mesh, `width` pixels wide. A surface with points is
+    refused."""
     if len(result.surface.points) > 0:
         raise ValueError("to_svg: the result is a surface, and to_svg draws outlines; draw a section "
                          "(result.sections[0].to_svg()), write a mesh (result.surface.to_meshio()), or let "

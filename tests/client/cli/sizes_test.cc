@@ -16,15 +16,23 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
+// Moves x by whole lengths into [low, low + length).
+double Wrapped(double x, double low, double length) {
+  return x - length * std::floor((x - low) / length);
+}
+
 // A square of 20 x 20: on the left particles 2 apart, on the right 1 apart. `column` has their
-// diameters times `factor`, to the power of `power`.
-void WriteZones(const std::string& path, const std::string& column, double factor, int power) {
+// diameters times `factor`, to the power of `power`. The square is wrapped into a box of `length`
+// from `low` on.
+void WriteZones(const std::string& path, const std::string& column, double factor, int power,
+                double low = -500, double length = 1000) {
   std::ofstream file(path);
   file.precision(12);
   file << "x,y," << column << "\n";
   const auto add = [&](double x, double y, double size) {
-    const double length = factor * size;
-    file << x << "," << y << "," << (power == 2 ? length * length : length) << "\n";
+    const double diameter = factor * size;
+    file << Wrapped(x, low, length) << "," << Wrapped(y, low, length) << ","
+         << (power == 2 ? diameter * diameter : diameter) << "\n";
   };
   for (int j = 0; j < 10; ++j) {
     for (int i = 0; i < 5; ++i) add(2 * i + 1, 2 * j + 1, 2);
@@ -228,6 +236,53 @@ TEST(SizedReplay, AWrongAttributeIsNamedByColumnAndParticle) {
   EXPECT_EQ(ran.exit_code, 3);
   EXPECT_THAT(ran.error,
               HasSubstr("attribute 'u' of particle 7 (counted from 0) at (7.5, 0.5): inf; must"));
+}
+
+TEST(SizedReplay, AWrongPhaseIsNamedByColumnAndParticle) {
+  const support::TemporaryFolder input;
+  std::ofstream file(input.Path("frame.csv"));
+  file << "x,y,type\n";
+  for (int k = 0; k < 400; ++k) {
+    file << k % 20 + .5 << "," << k / 20 + .5 << "," << (k == 7 ? 1.5 : 1) << "\n";
+  }
+  file.close();
+  const Ran ran = RunPartiemc(
+      {"replay", input.Path("frame.csv"), "--local", "--spacing", "1", "--phases", "type=1,2"});
+  EXPECT_EQ(ran.exit_code, 3);
+  EXPECT_THAT(ran.error, HasSubstr("attribute 'type' of particle 7 (counted from 0) at (7.5, 0.5): "
+                                   "1.5; must be a whole number: a phase"));
+}
+
+// The body is the same across a face of the box as in its middle, and the same through a server.
+TEST(SizedReplay, ABodyAcrossAFaceOfAPeriodicBoxIsWhole) {
+  const support::TemporaryFolder input;
+  WriteZones(input.Path("middle.csv"), "diameter", 1, 1);
+  WriteZones(input.Path("across.csv"), "diameter", 1, 1, 10.2, 40);
+  ServerProgram server;
+  for (const std::string boundary : {"bulk", "grains"}) {
+    const auto row = [&](const std::string& file, const std::string& box,
+                         std::vector<std::string> more) {
+      const support::TemporaryFolder output;
+      more.insert(more.begin(),
+                  {"replay", input.Path(file), "--spacing", "1", "--sizes", "own", "--boundary",
+                   boundary, "--periodic", "x,y", "--box", box, "--stats", output.Path("s.csv")});
+      const Ran ran = RunPartiemc(more);
+      EXPECT_EQ(ran.exit_code, 0) << ran.error;
+      const std::string stats = Content(output.Path("s.csv"));
+      std::vector<std::string> values;
+      for (const char* column : {"polylines", "area", "rings_digest"}) {
+        values.push_back(Column(stats, column).at(0));
+      }
+      return values;
+    };
+    const auto middle = row("middle.csv", "-10,30,-10,30", {"--local"});
+    const auto across = row("across.csv", "10.2,50.2,10.2,50.2", {"--local", "--check"});
+    EXPECT_EQ(across[0], middle[0]) << boundary;
+    EXPECT_NEAR(std::stod(across[1]), std::stod(middle[1]), 1e-6 * std::stod(middle[1]))
+        << boundary;
+    EXPECT_EQ(row("across.csv", "10.2,50.2,10.2,50.2", {"--server", server.address()}), across)
+        << boundary;
+  }
 }
 
 }  // namespace
