@@ -236,8 +236,9 @@ void AddMethodFlags(CLI::App& app, ReplayFlags& flags) {
          "--wall", flags.walls,
          "Wall at which the outline is cut, by its points in world units, with the fluid on "
          "its left. Two points: an endless line; 0,0,1,0 is the floor y = 0. More points: a "
-         "closed polygon, a tank if counter-clockwise, an obstacle if clockwise. Or the "
-         "particles of walls, by an attribute: type=2. Repeat for more walls")
+         "closed polygon, a tank if counter-clockwise, an obstacle if clockwise. With --periodic, "
+         "lines are parallel to the periodic axis, and polygons are obstacles. Or the particles of "
+         "walls, by an attribute: type=2. Repeat for more walls")
       ->type_name("X0,Y0,X1,Y1,...|NAME=N,...")
       ->allow_extra_args(false)
       ->group(kGroup);

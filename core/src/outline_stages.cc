@@ -20,11 +20,6 @@
 namespace partiemc {
 namespace {
 
-bool HasWalls(const OutlineTask& task) {
-  return !task.parameters.walls.empty() ||
-         (task.wall_outlines != nullptr && task.wall_outlines->RingCount() > 0);
-}
-
 void SumMeasures(const Rings& rings, FrameStatistics& statistics) {
   for (const RingMeasures& measures : rings.measures) {
     statistics.area += measures.area;
@@ -130,7 +125,7 @@ absl::Status FindWalls(const OutlineTask& task, const Scale& scale, FrameSize& s
                        FrameMemory& memory, Workspace::Buffers& b) {
   const TileDirectory& directory = b.bins.tiles;
   InStage(task.observer, Stage::kField, [&] {
-    b.walls.ListLines(task.parameters.walls, task.wall_outlines, scale.cell_size, directory);
+    b.walls.ListLines(task.walls.fixed, task.walls.of_particles, scale.cell_size, directory);
   });
   size.wall_pairs = b.walls.PairCount();
   size.wall_lines = b.walls.lines().edges().size();
@@ -146,7 +141,7 @@ void FindRings(const OutlineTask& task, const Scale& scale, Workspace::Buffers& 
   InStage(observer, Stage::kField, [&] {
     scale.is_slice ? SampleSlice(b.bins, scale, b.level_set)
                    : SampleField(b.bins, scale, b.level_set);
-    if (HasWalls(task)) b.walls.Apply(b.bins.tiles, scale.spacing, b.level_set);
+    if (task.walls.Any()) b.walls.Apply(b.bins.tiles, scale.spacing, b.level_set);
   });
   InStage(observer, Stage::kCrossings,
           [&] { FindCrossings(b.bins.tiles, b.level_set, b.crossings); });
@@ -267,7 +262,7 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     b.next_area_offset = previous.area_offset;
     return PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
                           parameters, task.variant, scale, percolates ? &percolation : nullptr,
-                          HasWalls(task) ? &b.walls : nullptr},
+                          task.walls.Any() ? &b.walls : nullptr},
                          b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
   });
   if (!is_placed) return absl::InternalError("rings cross although every vertex is at its root");
@@ -336,7 +331,7 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
                  .tiles = b.bins.tiles.size(),
                  .attribute_values = AttributeValuesOf(seen),
                  .phases = CountPhases(parameters)};
-  status = HasWalls(task) ? FindWalls(task, scale, size, memory, b) : memory.ReserveOutline(size);
+  status = task.walls.Any() ? FindWalls(task, scale, size, memory, b) : memory.ReserveOutline(size);
   if (!status.ok()) return status;
   FindRings(task, scale, b);
   FrameSize whole = SizeOf(parameters, seen, b);

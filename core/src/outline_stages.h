@@ -1,6 +1,8 @@
 // The stages of one outline: frame -> rings, mesh, attributes and the next state.
 #pragma once
 
+#include <span>
+
 #include "absl/status/status.h"
 #include "core/internal/research.h"
 #include "frame_memory.h"
@@ -15,6 +17,16 @@
 
 namespace partiemc {
 
+/// The walls of a frame (frame_walls.h).
+struct FrameWalls {
+  std::span<const Wall> fixed = {};
+  const Rings* of_particles = nullptr;  ///< Outlines of wall particles; null: none.
+
+  bool Any() const {
+    return !fixed.empty() || (of_particles != nullptr && of_particles->RingCount() > 0);
+  }
+};
+
 /// The input of one outline of a frame.
 struct OutlineTask {
   const ReconstructionParameters& parameters;
@@ -23,9 +35,9 @@ struct OutlineTask {
   const Frame& frame;
   const State& previous;
   StageObserver* observer;
-  bool is_first;                         ///< Whether this outline has to check the frame.
-  const Prepared* prepared;              ///< Null: `frame` is the given frame.
-  const Rings* wall_outlines = nullptr;  ///< Of wall particles; null: none.
+  bool is_first;             ///< Whether this outline has to check the frame.
+  const Prepared* prepared;  ///< Null: `frame` is the given frame.
+  FrameWalls walls = {};
 
   bool HasCopies() const { return prepared != nullptr && prepared->HasCopies(); }
 };

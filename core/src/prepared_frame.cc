@@ -96,6 +96,7 @@ absl::Status LiftFrame(const PreparationInput& input, double radius, std::span<c
   absl::Status status =
       Lift({.frame = frame,
             .box = *input.given.box,
+            .names = input.names,
             .axes = axes,
             .range = 2 * radius,
             .margin = margin,

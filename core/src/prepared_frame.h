@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
 
 #include "absl/status/status.h"
 #include "filter/noise_filter.h"
@@ -41,6 +43,8 @@ struct PreparationInput {
   const FrameLimits& limits;
   const Frame& given;  ///< After ResolveBox.
   const State& state;
+  /// By particle: the caller's number of it, for errors. Empty: its index.
+  std::span<const std::uint32_t> names = {};
 };
 
 struct PreparationScratch {

@@ -9,19 +9,18 @@
 #include <utility>
 
 #include "base/cancellation.h"
-#include "bins/bins.h"
 #include "bins/resolution.h"
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
 #include "frame/in_stage.h"
 #include "frame_lengths.h"
 #include "frame_memory.h"
+#include "frame_walls.h"
 #include "outline_stages.h"
 #include "partiemc/status.h"
 #include "partiemc/surface_reconstructor.h"
 #include "periodic/frame_box.h"
 #include "prepared_frame.h"
-#include "walls/wall_corners.h"
 #include "workspace.h"
 #include "workspace_bytes.h"
 
@@ -65,47 +64,6 @@ ReconstructionParameters ParametersOf(ReconstructionParameters parameters, const
   if (section.slice) parameters.slice = section.slice;
   parameters.isovalue = section.isovalue;
   return parameters;
-}
-
-// The parameters of the outline of wall particles, resolved.
-ReconstructionParameters WallParametersOf(const ReconstructionParameters& parameters) {
-  ReconstructionParameters of = parameters;
-  of.walls.clear();
-  of.fill = Fill::kNone;
-  of.min_component_area = 0;
-  of.min_component_particles = 0;
-  return of;
-}
-
-// Divides a frame that has passed CheckFrame into fluid and walls. The fluid decides the lengths of
-// both. Errors: see Reconstruct.
-absl::Status PrepareWalls(const Frame& given, const ReconstructionParameters& parameters,
-                          const State& state, FrameMemory& memory, Workspace::Buffers& b,
-                          Prepared& prepared) {
-  absl::Status status =
-      memory.ReserveParticles(WallParticles::BytesFor(given), "particles of fluid and walls");
-  if (!status.ok()) return status;
-  memory.Done();
-  status = b.wall_particles.Take(given, parameters);
-  if (!status.ok()) return status;
-  const Frame& fluid = b.wall_particles.fluid();
-  prepared.lifted = {.frame = fluid, .particles = fluid.ParticleCount()};
-  const auto lengths = DecideLengths(parameters, fluid, state, b.spacing);
-  if (!lengths.ok()) return lengths.status();
-  prepared.lengths = *lengths;
-  if (!prepared.lengths) return absl::OkStatus();
-  const double spacing = prepared.lengths->spacing;
-  // Checks the frame as given, so that errors name the caller's numbers of particles.
-  Scale scale;
-  scale.cell_size = prepared.lengths->cell_size;
-  status = CheckDistances(given, parameters.plane, scale);
-  if (!status.ok()) return status;
-  Doubts of_volumes;
-  if (auto lightest = LightestVolume(given, spacing * spacing, of_volumes); !lightest.ok()) {
-    return lightest.status();
-  }
-  status = CheckStep(given, parameters.plane, spacing, prepared.doubts);
-  return prepared.lengths->is_provisional ? absl::OkStatus() : status;
 }
 
 // Commits the new state of one outline. Buffers are swapped, so that both states keep their memory.
@@ -258,46 +216,41 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
     frame.attributes = b.attributes;
   }
   Prepared prepared;
-  const Rings* wall_outlines = nullptr;
-  if (!parameters_.wall_phases.empty()) {
+  const bool has_wall_particles = !parameters_.wall_phases.empty();
+  if (has_wall_particles) {
     status = CheckFrame(given, parameters_, limits_, b.distinct_ids);
     if (!status.ok()) return status;
-    status = PrepareWalls(given, parameters_, state, memory, b, prepared);
+    status = TakeWallParticles(frame, parameters_, state, memory, b, prepared);
     if (!status.ok()) return status;
     frame = b.wall_particles.fluid();
-    b.wall_result.Clear();
-    if (prepared.lengths) {
-      Prepared of_walls = prepared;
-      of_walls.lifted.particles = b.wall_particles.walls().ParticleCount();
-      status =
-          ReconstructOutline({*walls_, VariantFor(*walls_, *variant_), limits_,
-                              b.wall_particles.walls(), unseen, control.observer, false, &of_walls},
-                             memory, b, b.wall_state, b.wall_result);
-      if (!status.ok()) return status;
-      memory.Done();
-      InStage(control.observer, Stage::kField, [&] {
-        SharpenCorners(prepared.lengths->spacing, b.wall_corners, b.wall_result.rings);
-      });
-    }
-    wall_outlines = &b.wall_result.rings;
   }
   Prepare(frame.attributes, parameters_, result);
   if (is_prepared) {
+    const auto names =
+        has_wall_particles ? b.wall_particles.fluid_sources() : std::span<const std::uint32_t>();
     status = InStage(control.observer, Stage::kBins, [&] {
-      return PrepareFrame({parameters_, limits_, frame, state}, memory,
+      return PrepareFrame({parameters_, limits_, frame, state, names}, memory,
                           {b.distinct_ids, b.spacing, b.noise, b.lift}, frame, prepared);
     });
+    if (!status.ok()) return status;
+  }
+  FrameWalls walls;
+  if (HasWalls(parameters_)) {
+    const auto variant = walls_ ? VariantFor(*walls_, *variant_) : VirtualPlaneVariant();
+    status = FindFrameWalls(
+        {parameters_, walls_.get(), variant, limits_, frame, prepared, control.observer}, memory, b,
+        walls);
     if (!status.ok()) return status;
   }
   const auto task_of = [&](const ReconstructionParameters& parameters, const State& previous,
                            std::size_t outline) {
     const bool is_first = outline == (is_surface ? 1 : 0) && !is_prepared &&
-                          !HasPhases(parameters_) && wall_outlines == nullptr;
-    return OutlineTask{parameters,   VariantFor(parameters, *variant_),
-                       limits_,      frame,
-                       previous,     control.observer,
-                       is_first,     is_prepared || wall_outlines != nullptr ? &prepared : nullptr,
-                       wall_outlines};
+                          !HasPhases(parameters_) && !has_wall_particles;
+    return OutlineTask{parameters, VariantFor(parameters, *variant_),
+                       limits_,    frame,
+                       previous,   control.observer,
+                       is_first,   is_prepared || has_wall_particles ? &prepared : nullptr,
+                       walls};
   };
   const auto reconstruct = [&](const ReconstructionParameters& parameters, const State& previous,
                                std::size_t outline, Result& into) {

@@ -2,7 +2,6 @@
 #include "partiemc/surface_reconstructor.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -27,7 +26,6 @@
 #include "partiemc/state.h"
 #include "partiemc/status.h"
 #include "periodic/frame_box.h"
-#include "periodic/lift.h"
 #include "simplify/simplify.h"
 #include "space/bins.h"
 #include "space/bodies.h"
@@ -43,10 +41,10 @@
 #include "space_vertices/drops.h"
 #include "space_vertices/point_attributes.h"
 #include "space_vertices/vertices.h"
+#include "surface_frame.h"
 #include "surface_placement.h"
 #include "surface_planes.h"
 #include "surface_workspace.h"
-#include "walls/wall_images.h"
 
 namespace partiemc {
 
@@ -295,9 +293,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   Frame framed = given;
   if (absl::Status status = ResolveBox(parameters_.box, framed); !status.ok()) return status;
   const bool wraps = framed.box && framed.box->wraps;
-  LiftedFrame lifted{.frame = framed};
-  CopiedBox copied;
-  std::size_t own_particles = given.ParticleCount();
+  SurfaceFrame prepared{.lifted = {.frame = framed}};
+  const LiftedFrame& lifted = prepared.lifted;
+  const CopiedBox& copied = prepared.copied;
   const Frame& frame = lifted.frame;
   space::SurfaceSize size{.particles = frame.ParticleCount(),
                           .has_windows = placement == SurfacePlacement::kVirtualPlane,
@@ -320,61 +318,36 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
       if (!range.ok()) return range.status();
       sizes = *range;
     }
-    if (parameters_.box) {
-      constexpr std::array kAxes = {0, 1, 2};
-      checked = CheckBoxLengths(parameters_.box, *framed.box, parameters_.kernel_radius, h, sizes);
-      if (!checked.ok()) return checked;
-      checked = Lift({.frame = framed,
-                      .box = *framed.box,
-                      .axes = kAxes,
-                      .range = 2 * parameters_.kernel_radius * h * sizes.Reach(),
-                      .margin = kCopyMargin * parameters_.kernel_radius * h * sizes.Reach(),
-                      .wraps = framed.box->wraps,
-                      .reserve =
-                          [&](std::uint64_t bytes) {
-                            size.lift_bytes = bytes;
-                            return Reserve(size, control.memory);
-                          }},
-                     b.lift, lifted);
-      if (!checked.ok()) return checked;
-      copied = CopiedBoxOf(parameters_.kernel_radius * h * sizes.Reach(), lifted);
-      size.particles = frame.ParticleCount();
-      size.box_axes = static_cast<std::uint64_t>(std::ranges::count(copied.has_copies, true));
-    }
-    if (!parameters_.wall_planes.empty()) {
-      checked = AddWallImages({.frame = given,
-                               .planes = parameters_.wall_planes,
-                               .depth = kImageRadii * parameters_.kernel_radius * h,
-                               .tolerance = kWallTolerance * h,
-                               .nearest = kLeastHeight * h,
-                               .reserve =
-                                   [&](std::uint64_t bytes) {
-                                     size.lift_bytes = bytes;
-                                     return Reserve(size, control.memory);
-                                   }},
-                              b.images, lifted.frame, own_particles);
-      size.particles = frame.ParticleCount();
-      if (!checked.ok() || own_particles == 0) return checked;
-    }
-    b.virtual_plane.volumes.clip =
-        copied.any ? std::optional(copied.faces) : SpaceBeforeWalls(parameters_);
-    b.virtual_plane.volumes.clips_images = copied.any;
+    checked = AddImages({.parameters = parameters_,
+                         .given = framed,
+                         .sizes = sizes,
+                         .reserve =
+                             [&](std::uint64_t bytes) {
+                               size.lift_bytes = bytes;
+                               return Reserve(size, control.memory);
+                             }},
+                        b.frame, prepared);
+    size.particles = frame.ParticleCount();
+    if (!checked.ok() || size.particles == 0) return checked;
+    size.box_axes = static_cast<std::uint64_t>(std::ranges::count(copied.has_copies, true));
+    b.virtual_plane.volumes.before_walls = prepared.before_walls;
+    b.virtual_plane.volumes.in_box = prepared.in_box;
     absl::StatusOr<double> lightest = h * h * h;
     if (parameters_.sizes == Sizes::kEqual) {
       lightest = LightestVolume(given, *lightest, doubts);
       if (!lightest.ok()) return lightest.status();
     }
     scale = MakeScale(in_space_, h, cell_size, *lightest, sizes);
-    space::GivenParticles names{.originals = lifted.originals, .first = lifted.particles};
-    if (!parameters_.wall_planes.empty()) names = {.originals = b.images.originals};
-    checked = space::FindBricks(frame, scale, limits_, b.bins, names);
+    checked = space::FindBricks(frame, scale, limits_, b.bins, prepared.names);
     size.bricks = bricks.size();
     if (scale.has_own_sizes) size.size_classes = b.bins.classes.size();
     if (checked.ok()) checked = Reserve(size, control.memory);
     if (checked.ok()) space::SortParticles(frame, scale, b.bins);
-    b.bins.are_images_mirrored = !copied.any;
-    const bool has_images = copied.any || !parameters_.wall_planes.empty();
-    b.bins.first_image = has_images ? static_cast<std::uint32_t>(own_particles) : kNoIndex;
+    const auto first = [](bool any, std::size_t index) {
+      return any ? static_cast<std::uint32_t>(index) : kNoIndex;
+    };
+    b.bins.first_image = first(copied.any || prepared.HasMirrors(), lifted.particles);
+    b.bins.first_mirror = first(prepared.HasMirrors(), prepared.first_mirror);
     if (!checked.ok()) return checked;
     if (AreCoarse(given, h * sizes.smallest)) doubts.Add(Doubt::kPositionsCoarse);
     if (space::ContradictsSpacing(b.bins, scale)) doubts.Add(Doubt::kSpacingContradicted);
@@ -393,7 +366,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     space::FindCrossings(bricks, b.field, b.crossings);
     size.edges = b.crossings.edge_count;
     if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
-    AddBodies(frame, own_particles, h * h * h, b.bodies, size);
+    AddBodies(frame, lifted.particles, h * h * h, b.bodies, size);
     absl::Status reserved = Reserve(size, control.memory);
     if (reserved.ok()) space::ListSteps(bricks, b.crossings);
     return reserved;
@@ -461,16 +434,17 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     });
   }
   const double inner_step = InnerStep(parameters_, frame);
+  b.plane_cuts.is_done.clear();
+  if (copied.any) {
+    const bool is_cut = in_stage(Stage::kMesh, [&] {
+      return CutAtBox(parameters_, inner_step, copied, b.cut_shells, b.plane_cuts, surface);
+    });
+    if (!is_cut) return absl::InternalError("a surface cannot be cut at its box");
+  }
   if (!parameters_.wall_planes.empty()) {
     const bool is_cut = in_stage(
         Stage::kMesh, [&] { return CutAtWalls(parameters_, inner_step, b.plane_cuts, surface); });
     if (!is_cut) return absl::InternalError("a surface cannot be cut at its walls");
-  }
-  if (copied.any) {
-    const bool is_cut = in_stage(Stage::kMesh, [&] {
-      return CutAtBox(h, inner_step, copied, b.cut_shells, b.plane_cuts, surface);
-    });
-    if (!is_cut) return absl::InternalError("a surface cannot be cut at its box");
   }
   if (!frame.attributes.empty()) {
     in_stage(Stage::kAttributes, [&] {

@@ -8,7 +8,6 @@
 #include "frame/distinct_ids.h"
 #include "partiemc/surface_reconstructor.h"
 #include "partiemc/surface_state.h"
-#include "periodic/lift.h"
 #include "space/bins.h"
 #include "space/bodies.h"
 #include "space/cleaning.h"
@@ -21,8 +20,8 @@
 #include "space_vertices/drops.h"
 #include "space_vertices/thinning.h"
 #include "space_vertices/virtual_plane.h"
+#include "surface_frame.h"
 #include "surface_planes.h"
-#include "walls/wall_images.h"
 
 namespace partiemc {
 
@@ -34,10 +33,9 @@ struct SurfaceWorkspace::Buffers {
   space::SpaceCrossings crossings;
   space::Bodies bodies;
   space::CleaningScratch cleaning;
-  LiftScratch lift;                     // Empty without a periodic box.
+  SurfaceFrameScratch frame;
   space::BodyImageScratch body_images;  // Empty unless particles have copies.
   space::CutShells cut_shells;          // Empty unless particles have copies.
-  WallImageScratch images;              // Empty without walls.
   PlaneCuts plane_cuts;                 // Empty unless walls or a box cut.
   std::vector<Vec3> anchors, positions, normals;
   std::vector<std::uint8_t> is_fixed;

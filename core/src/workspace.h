@@ -29,6 +29,7 @@
 #include "rings/rings.h"
 #include "sampler/level_set_sampler.h"
 #include "vertices/vertices.h"
+#include "walls/wall_copies.h"
 #include "walls/wall_corners.h"
 #include "walls/wall_field.h"
 #include "walls/wall_particles.h"
@@ -61,7 +62,8 @@ struct Workspace::Buffers {
   LevelSet level_set;
   WallField walls;               // Empty without walls.
   WallParticles wall_particles;  // Empty unless particles of some phases are walls.
-  NextState wall_state;          // The same. It is never committed.
+  WallCopies wall_copies;        // Empty unless a periodic box has walls.
+  NextState wall_state;          // Of wall particles. It is never committed.
   Result wall_result;
   WallCornerScratch wall_corners;
   Crossings crossings;

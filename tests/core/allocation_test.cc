@@ -239,14 +239,17 @@ TEST(WarmFrameBox, AllocatesNothing) {
   EXPECT_TRUE(state.history.box.has_value());
 }
 
-// Bodies that slide along a floor around an obstacle, with walls as lines and as particles.
-class WarmFrameAtWalls : public testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(AreParticles, WarmFrameAtWalls, testing::Bool(),
-                         testing::PrintToStringParamName());
+// Bodies that slide along a floor around an obstacle, with walls as lines and as particles, also in
+// a periodic box.
+class WarmFrameAtWalls : public testing::TestWithParam<std::tuple<bool, bool>> {};
+INSTANTIATE_TEST_SUITE_P(AreParticlesInBox, WarmFrameAtWalls,
+                         testing::Combine(testing::Bool(), testing::Bool()));
 
 TEST_P(WarmFrameAtWalls, AllocatesNothing) {
+  const auto [are_particles, in_box] = GetParam();
   ReconstructionParameters parameters{.spacing = 1.0};
-  if (GetParam()) {
+  if (in_box) parameters.box = PeriodicBox{.axes = {PeriodicAxis{-20, 120}}};
+  if (are_particles) {
     parameters.wall_phases = {2};
   } else {
     parameters.walls = {{{0, 0, 1, 0}}, {{20, 6, 24, 12, 28, 6}}};
@@ -258,7 +261,7 @@ TEST_P(WarmFrameAtWalls, AllocatesNothing) {
     Particles frame = support::Lattice(40 + 3 * k, 20 - k, .5, .5);
     frame.Add(support::Disc(6, 70.0 - 3 * k, 3));
     frame.phases.assign(frame.size(), 1);
-    if (GetParam()) {
+    if (are_particles) {
       frame.Add(support::Lattice(120, 2, -20.5, -1.5));
       frame.phases.resize(frame.size(), 2);
     }
@@ -407,6 +410,13 @@ std::vector<MemoryCase> MemoryCases() {
       {.sizes = Sizes::kOwn, .box = boxed(300)});
   add("percolating noise of own sizes", sized(support::Noise(random, 30'000, 300)),
       {.sizes = Sizes::kOwn, .box = boxed(600)});
+  ReconstructionParameters channel{
+      .box = PeriodicBox{.axes = {PeriodicAxis{-300, 600}}},
+      .walls = {{{0, -9, 1, -9}}, support::PolygonWall(299, 40, 20, 300, 0, false)}};
+  add("noise in a periodic channel", support::Noise(random, 30'000, 300), channel);
+  channel.wall_phases = {2};
+  add("noise among wall particles of a periodic box", phased(support::Noise(random, 30'000, 300)),
+      channel);
   add("wrapped noise of own sizes", sized(support::Noise(random, 30'000, 300)),
       {.sizes = Sizes::kOwn, .box = wrapped});
   ReconstructionParameters boxed_grains = grains;

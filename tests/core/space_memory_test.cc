@@ -190,6 +190,7 @@ TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
     std::vector<double> xyz;
     PeriodicBox box;
     Sizes sizes = Sizes::kEqual;
+    std::vector<WallPlane> walls = {};
   };
   support::Random random(6);
   const auto box = [](double x, double y, double z) {
@@ -231,13 +232,21 @@ TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
   PeriodicBox wrapped = box(40, 40, 40);
   wrapped.wraps = true;
   cases.push_back({"spray, wrapped", spray, wrapped});
+  const std::vector<WallPlane> floor = {{.axis = 2, .position = .3}};
+  cases.push_back({"layer on a floor", lattice(40, 40, 5), box(40, 40, 0), Sizes::kEqual, floor});
+  cases.push_back({"sized noise on a floor", noise, box(20, 20, 0), Sizes::kOwn, floor});
+  wrapped = box(40, 40, 0);
+  wrapped.wraps = true;
+  cases.push_back({"spray on a floor, wrapped", spray, wrapped, Sizes::kEqual, floor});
   for (const Case& tested : cases) {
     for (const SurfacePlacement placement :
          {SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,
           SurfacePlacement::kVirtualPlane}) {
       SCOPED_TRACE(absl::StrCat(tested.name, ", placement ", static_cast<int>(placement)));
-      const auto reconstructor = SurfaceReconstructor::Create(
-          {.placement = placement, .sizes = tested.sizes, .box = tested.box});
+      const auto reconstructor = SurfaceReconstructor::Create({.placement = placement,
+                                                               .sizes = tested.sizes,
+                                                               .box = tested.box,
+                                                               .wall_planes = tested.walls});
       ASSERT_TRUE(reconstructor.ok()) << reconstructor.status();
       const std::vector<std::vector<double>> frames = {tested.xyz};
       std::vector<std::vector<float>> volumes(1);
@@ -264,7 +273,9 @@ TEST(MemoryGuard, IsToldNoLessThanAPercolatingSurfaceTakes) {
                      std::to_string(static_cast<double>(told) / static_cast<double>(held)));
       EXPECT_LE(held, told);
       // Each copy of a lone particle may become an ellipsoid with the most points, or none.
-      const double most = tested.name == "spray, wrapped" ? 3.5 : 3;
+      const double most_in_box = tested.name == "spray, wrapped" ? 3.5 : 3;
+      // As in IsToldNoLessThanACutAtWallsTakes: lone particles at walls need the most.
+      const double most = tested.walls.empty() ? most_in_box : 6;
       EXPECT_GE(most * static_cast<double>(held), static_cast<double>(told));
     }
   }

@@ -445,9 +445,6 @@ TEST(Walls, BrokenRulesAreNamed) {
   of = with(floor);
   of.output = Output::kSurface;
   cases.push_back({of, "walls", "surface"});
-  of = with(floor);
-  of.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
-  cases.push_back({of, "walls", "periodic box"});
   of = {.spacing = 1.0, .wall_phases = {1, 2, 1}};
   cases.push_back({of, "wall_phases[2]", "differ from wall_phases[0]"});
   of.wall_phases = {1 << 25};

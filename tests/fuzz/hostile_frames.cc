@@ -77,6 +77,20 @@ Wall HostileWall(Choices& choices, double spacing) {
   return {.points = {x0, y0, x1, y0, x1, y1, x0, y1}};
 }
 
+// Most walls of a periodic box are refused. This one is more often an endless line along the
+// periodic axis or a clockwise polygon.
+Wall InBox(Wall wall, const PeriodicBox& box) {
+  std::vector<double>& points = wall.points;
+  if (points.size() == 4) {
+    if (box.axes[0]) points[3] = points[1];
+    if (!box.axes[0] && box.axes[1]) points[2] = points[0];
+  } else if (points.size() == 8 && (points[4] > points[0]) == (points[5] > points[1])) {
+    std::swap(points[2], points[6]);
+    std::swap(points[3], points[7]);
+  }
+  return wall;
+}
+
 // The id of particle `k`: usually its number, so that successive frames share particles; otherwise
 // any byte, which may repeat an id or reuse another particle's.
 std::uint64_t HostileId(Choices& choices, std::size_t k) {
@@ -201,6 +215,9 @@ ReconstructionParameters HostileParameters(Choices& choices) {
     parameters.sizes = Sizes::kOwn;
     if (choices.Below(2) == 1) parameters.boundary = Boundary::kGrains;
   }
+  const bool may_have_walls = parameters.boundary == Boundary::kBulk &&
+                              parameters.sizes == Sizes::kEqual &&
+                              parameters.placement == Placement::kVirtualPlane;
   const bool may_have_phases = !parameters.box && parameters.boundary == Boundary::kBulk &&
                                parameters.placement == Placement::kVirtualPlane;
   if (may_have_phases && choices.Below(2) == 1) {
@@ -209,15 +226,16 @@ ReconstructionParameters HostileParameters(Choices& choices) {
       parameters.sections.push_back({.phase = phase});
     }
   }
-  const bool may_have_walls =
-      may_have_phases && parameters.sections.empty() && parameters.sizes == Sizes::kEqual;
-  if (may_have_walls && choices.Below(2) == 1) {
+  if (may_have_walls && parameters.sections.empty() && choices.Below(2) == 1) {
     const std::size_t count = 1 + choices.Below(3);
     for (std::size_t k = 0; k < count; ++k) {
-      parameters.walls.push_back(HostileWall(choices, parameters.spacing.value_or(1)));
+      Wall wall = HostileWall(choices, parameters.spacing.value_or(1));
+      if (parameters.box && k % 4 != 3) wall = InBox(std::move(wall), *parameters.box);
+      parameters.walls.push_back(std::move(wall));
     }
   }
-  if (may_have_walls && !parameters.noise_filter && choices.Below(2) == 1) {
+  if (may_have_walls && parameters.sections.empty() && !parameters.noise_filter &&
+      choices.Below(2) == 1) {
     for (std::int32_t phase = static_cast<std::int32_t>(choices.Below(3)); phase >= 0; --phase) {
       parameters.wall_phases.push_back(phase);
     }

@@ -37,6 +37,13 @@ ReconstructionParameters HostileSurface(Choices& choices) {
     parameters.sections.push_back(
         {.slice = SlicePlane{.origin = {0, 0, .25}, .normal = {0, 1, 2}}});
   }
+  // At the end, so that the corpus keeps its meaning.
+  for (std::size_t left = choices.Below(4) == 1 ? 1 + choices.Below(3) : 0; left > 0; --left) {
+    const auto axis = static_cast<int>(choices.Below(3));
+    constexpr std::array kPlaces = {0., -1., .25, 2., 1e-9, 1e20};
+    const double place = kPlaces[choices.Below(kPlaces.size())];
+    parameters.wall_planes.push_back({axis, place, choices.Flip()});
+  }
   return parameters;
 }
 

@@ -84,13 +84,15 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
     walls: walls at which the outline is cut, with the fluid on their left: for each the coordinates
         of its points, [x0, y0, x1, y1, ...] or an (n, 2) array. [0, 0, 1, 0] is the endless floor
         y = 0. Three points or more are a closed polygon: a tank if they are counter-clockwise, an
-        obstacle if they are clockwise. `rings.wetted` are the points whose next segment lies on a
+        obstacle if they are clockwise. In a box, lines are parallel to the periodic axis, and polygons
+        are obstacles. `rings.wetted` are the points whose next segment lies on a
         wall, `rings.contacts` the points where the outline meets a wall, `rings.contact_angles` the
         angles of the fluid there, in radians.
     wall_phases: the phases of the particles of walls (`phase_attribute`). Their outline is a wall.
     wall_planes: walls at which a surface is cut, at most one for each side of each axis: for each a
         dict of axis ("x", "y" or "z"), position, and side of the fluid ("above", the default, or
-        "below"). [{"axis": "z", "position": 0}] is the floor z = 0.
+        "below"). [{"axis": "z", "position": 0}] is the floor z = 0. In a box, no wall is across a
+        periodic axis.
     sizes: "equal" (the default), or "own": each particle has the size sqrt(volume), for a surface
         cbrt(volume).
     boundary: "bulk" (the default), or "grains", with own sizes: particles are discs of the diameter

@@ -186,7 +186,7 @@ struct ReconstructionParameters {
   /// With own sizes, a particle acts within `kernel_radius` times h_i, and smoothing follows the
   /// local size. Frames must have volumes. Except with grains, an absent spacing is estimated as
   /// the root mean square of the sizes. A size must be within a factor of `kMostSizeRatio` of the
-  /// spacing, and its kernel radius at most 32 cells. Excludes slices, walls, `noise_filter` and
+  /// spacing, and its kernel radius at most 32 cells. Excludes slices, `walls`, `noise_filter` and
   /// Placement::kFarthestParticle.
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
@@ -279,7 +279,7 @@ struct ReconstructionParameters {
   /// is cut at the faces (Rings::cuts, Surface::cuts). `farthest-particle` refuses such a frame
   /// (PERCOLATES). A length must be at least four kernel radii, in each frame also those of its
   /// largest particle, and at most kMostSpacings spacings. For outlines, only axes of the plane of
-  /// the particles may be periodic. Excludes slices, phases, walls. Frame::box may replace it.
+  /// the particles may be periodic. Excludes slices and phases. Frame::box may replace it.
   std::optional<PeriodicBox> box = std::nullopt;
 
   /// If present, positions are filtered from frame to frame against white noise (core/NOISE.md).
@@ -293,8 +293,10 @@ struct ReconstructionParameters {
 
   /// Walls, of at most 1024 points together, at which the outline is cut (core/WALLS.md). The fluid
   /// lies on the fluid side of every wall. An outline nearer than half a spacing to a wall runs
-  /// along the wall. Obstacles narrower than a cell may be missed. Requires
-  /// Placement::kVirtualPlane; excludes surfaces, slices, isovalues, sections, own sizes and `box`.
+  /// along the wall. Obstacles narrower than a cell may be missed. In a box, endless lines are
+  /// parallel to the periodic axis, and polygons are obstacles, which have periodic images.
+  /// Requires Placement::kVirtualPlane; excludes surfaces, slices, isovalues, sections and own
+  /// sizes.
   std::vector<Wall> walls = {};
 
   static constexpr std::size_t kMaxWallPhases = 16;
@@ -309,8 +311,9 @@ struct ReconstructionParameters {
 
   /// Walls at which a surface is cut (core/WALLS.md, "Surfaces"): for each axis at most one with
   /// the fluid above and one with the fluid below, at least a kernel radius apart. The fluid lies
-  /// on the fluid side of every wall. The triangles on walls are in Surface::cuts. Requires
-  /// Output::kSurface; excludes sections, own sizes and `box`.
+  /// on the fluid side of every wall. The triangles on walls are in Surface::cuts. No wall is
+  /// across a periodic axis of the box. With own sizes, the kernel radius of the largest particle
+  /// counts. Requires Output::kSurface; excludes sections.
   std::vector<WallPlane> wall_planes = {};
 
   friend bool operator==(const ReconstructionParameters&,

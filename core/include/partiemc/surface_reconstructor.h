@@ -29,7 +29,7 @@ struct SurfaceParameters {
 
   /// Particle spacing h in world units, in [1e-60, 1e60]. The lengths below are multiples of h.
   double spacing = 1;
-  /// As in ReconstructionParameters, with the same ranges. Own sizes exclude walls.
+  /// As in ReconstructionParameters, with the same ranges.
   double kernel_radius = 3, cell_size = 1;
   Sizes sizes = Sizes::kEqual;
   /// Reference radius in spacings. Absent: calibrated (core/SURFACES.md).

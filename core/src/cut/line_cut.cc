@@ -16,8 +16,8 @@ bool IsKept(const AxisLine& line, const Point& point) {
   return (Across(line, point) > line.at) == line.keeps_above;
 }
 
-// The point where the segment from a to b crosses the line. Has `is_cut` of a, because the rest of
-// the segment begins here.
+// The point where the segment from a to b crosses the line. Has `is_cut` and `is_wet` of a, because
+// the rest of the segment begins here.
 LoopPoint CrossingOf(const AxisLine& line, const LoopPoint& a, const LoopPoint& b) {
   const double t = (line.at - Across(line, a.at)) / (Across(line, b.at) - Across(line, a.at));
   const auto between = [&](double from, double to) {
@@ -27,6 +27,7 @@ LoopPoint CrossingOf(const AxisLine& line, const LoopPoint& a, const LoopPoint& 
   point.at = line.axis == 0 ? Point{line.at, between(a.at.y, b.at.y)}
                             : Point{between(a.at.x, b.at.x), line.at};
   point.root = point.at;
+  point.contact_angle = LoopPoint::kNoContact;
   const auto s = static_cast<float>(t);
   const float x = a.normal_x + s * (b.normal_x - a.normal_x);
   const float y = a.normal_y + s * (b.normal_y - a.normal_y);
@@ -53,7 +54,10 @@ void AddChains(const AxisLine& line, std::span<const LoopPoint> loop, std::uint3
     const auto number = static_cast<std::uint32_t>(s.chains.size());
     if (was_kept != is_kept) {
       LoopPoint crossing = CrossingOf(line, before, point);
-      if (was_kept) crossing.is_cut = true;
+      if (was_kept) {
+        crossing.is_cut = true;
+        crossing.is_wet = false;
+      }
       const double along = line.axis == 0 ? crossing.at.y : crossing.at.x;
       s.crossings.push_back({along, was_kept ? number - 1 : number, is_kept});
       if (is_kept) {

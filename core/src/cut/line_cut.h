@@ -24,6 +24,9 @@ struct LoopPoint {
   Point root;  ///< Its root (PlacedVertices::roots); equals `at` if it has none.
   float normal_x = 0, normal_y = 0;
   bool is_cut = false;  ///< The segment to the next point lies on a line at which a ring was cut.
+  bool is_wet = false;  ///< The segment to the next point lies on a wall (Rings::wetted).
+  float contact_angle = kNoContact;  ///< Rings::contact_angles; kNoContact if it is no contact.
+  static constexpr float kNoContact = -1;
 };
 
 /// Closed polylines with the inside on the left.

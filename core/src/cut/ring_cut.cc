@@ -25,10 +25,69 @@ bool IsCut(const RingCutInput& input, const RingCutScratch& s, std::size_t ring)
   return input.percolation.IsCut(input.topology, s.topology_ring[ring]);
 }
 
+// Reads Rings::wetted and Rings::contacts along with the points, in their order.
+class WallMarks {
+ public:
+  explicit WallMarks(const Rings& rings) : rings_(rings) {}
+
+  // Sets the marks of a point. Requires: a larger index than in the last call.
+  void Set(std::uint32_t index, LoopPoint& point) {
+    point.is_wet = Take(rings_.wetted, index, wet_);
+    if (Take(rings_.contacts, index, contact_)) {
+      point.contact_angle = rings_.contact_angles[contact_];
+    }
+  }
+
+ private:
+  // Whether a list has the index. Moves `at` to the first entry that is not smaller.
+  static bool Take(const std::vector<std::uint32_t>& list, std::uint32_t index, std::size_t& at) {
+    while (at < list.size() && list[at] < index) ++at;
+    return at < list.size() && list[at] == index;
+  }
+
+  const Rings& rings_;
+  std::size_t wet_ = 0, contact_ = 0;
+};
+
+// Renumbers Rings::wetted and Rings::contacts in place while runs of points move to lower indices.
+class MovedMarks {
+ public:
+  explicit MovedMarks(Rings& rings) : rings_(rings) {}
+
+  // The points [first, last) move to `to`. Points between two runs are removed.
+  void Move(std::uint32_t first, std::uint32_t last, std::uint32_t to) {
+    const auto move = [&](std::vector<std::uint32_t>& list, Range& range, const auto& keep) {
+      while (range.read < list.size() && list[range.read] < first) ++range.read;
+      for (; range.read < list.size() && list[range.read] < last; ++range.read) {
+        keep();
+        list[range.written++] = list[range.read] - first + to;
+      }
+    };
+    move(rings_.wetted, wet_, [] {});
+    move(rings_.contacts, contact_,
+         [&] { rings_.contact_angles[contact_.written] = rings_.contact_angles[contact_.read]; });
+  }
+
+  void Finish() {
+    rings_.wetted.resize(wet_.written);
+    rings_.contacts.resize(contact_.written);
+    rings_.contact_angles.resize(contact_.written);
+  }
+
+ private:
+  struct Range {
+    std::size_t read = 0, written = 0;
+  };
+
+  Rings& rings_;
+  Range wet_, contact_;
+};
+
 // Collects the rings to be cut.
 void CollectLoops(const RingCutInput& input, const Rings& rings, const PlacedVertices& placed,
                   RingCutScratch& s) {
   s.loops.Clear();
+  WallMarks marks(rings);
   for (std::uint32_t ring = 0; ring < rings.RingCount(); ++ring) {
     if (!IsCut(input, s, ring)) continue;
     const auto first = static_cast<std::uint32_t>(s.loops.points.size());
@@ -38,6 +97,7 @@ void CollectLoops(const RingCutInput& input, const Rings& rings, const PlacedVer
                                 .root = placed.roots.empty() ? at : PointAt(placed.roots, k),
                                 .normal_x = rings.normals[2 * k],
                                 .normal_y = rings.normals[2 * k + 1]});
+      marks.Set(k, s.loops.points.back());
     }
     const std::uint32_t outer = rings.outer_of[ring];
     s.loops.loops.push_back({.first = first,
@@ -75,7 +135,7 @@ class Assembly {
  public:
   Assembly(const RingCutInput& input, const Rings& from, const PlacedVertices& placed,
            RingCutScratch& s)
-      : input_(input), from_(from), placed_(placed), s_(s), to_(s.rings) {
+      : input_(input), from_(from), placed_(placed), s_(s), marks_(from), to_(s.rings) {
     to_.Clear();
     s_.roots.clear();
     s_.group.clear();
@@ -124,12 +184,25 @@ class Assembly {
       target.insert(target.end(), source.begin() + 2 * from_.offsets[ring],
                     source.begin() + 2 * from_.offsets[ring + 1]);
     };
+    const auto first = static_cast<std::uint32_t>(to_.PointCount());
+    for (std::uint32_t k = from_.offsets[ring]; k < from_.offsets[ring + 1]; ++k) {
+      LoopPoint point;
+      marks_.Set(k, point);
+      AddMarks(first + k - from_.offsets[ring], point);
+    }
     append(from_.points, to_.points);
     append(from_.normals, to_.normals);
     append(placed_.roots, s_.roots);
     to_.measures.push_back(from_.measures[ring]);
     const std::uint32_t outer = from_.outer_of[ring];
     EndRing(outer == kNoRing ? ring : outer, outer != kNoRing, ring);
+  }
+
+  void AddMarks(std::uint32_t index, const LoopPoint& point) {
+    if (point.is_wet) to_.wetted.push_back(index);
+    if (point.contact_angle == LoopPoint::kNoContact) return;
+    to_.contacts.push_back(index);
+    to_.contact_angles.push_back(point.contact_angle);
   }
 
   bool AddLoop(const Loops::Loop& loop) {
@@ -143,6 +216,7 @@ class Assembly {
       if (!placed_.roots.empty()) {
         s_.roots.insert(s_.roots.end(), {point.root.x, point.root.y});
       }
+      AddMarks(first + static_cast<std::uint32_t>(k), point);
       if (!point.is_cut) continue;
       to_.cuts.push_back(first + static_cast<std::uint32_t>(k));
       const Point& next = points[(k + 1) % points.size()].at;
@@ -196,6 +270,7 @@ class Assembly {
   const Rings& from_;
   const PlacedVertices& placed_;
   RingCutScratch& s_;
+  WallMarks marks_;
   Rings& to_;
 };
 
@@ -235,6 +310,7 @@ bool NestRings(RingCutScratch& s) {
 void RemoveGoneRings(const Percolation& percolation, const RingTopology& topology,
                      PlacedVertices& placed, Rings& rings) {
   std::uint32_t kept = 0, end = 0;
+  MovedMarks marks(rings);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
     const std::uint32_t old = placed.kept_as[ring];
     if (old == kNoRing) continue;
@@ -250,12 +326,14 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
     move(rings.points);
     move(rings.normals);
     move(placed.roots);
+    marks.Move(first, last, end);
     rings.measures[kept] = rings.measures[old];
     rings.outer_of[kept] = topology.outer_of[ring];  // Renumbered below.
     end += last - first;
     rings.offsets[kept] = end - (last - first);
     placed.kept_as[ring] = kept++;
   }
+  marks.Finish();
   rings.offsets.resize(kept + 1);
   rings.offsets[kept] = end;
   rings.points.resize(2 * std::size_t{end});

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "base/point.h"
 #include "base/predicates.h"
+#include "frame/frame_view.h"
 #include "frame/phase_rules.h"
 #include "partiemc/status.h"
 
@@ -67,6 +68,31 @@ absl::Status CheckPoints(const std::string& field, std::span<const double> point
   return count == 2 ? absl::OkStatus() : CheckPolygon(field, points);
 }
 
+// Checks a wall in a periodic box: endless lines must be their own images, and other walls must be
+// obstacles, because the fluid of a tank is at one place only.
+absl::Status CheckInBox(const std::string& field, std::span<const double> points,
+                        const PeriodicBox& box, Plane plane) {
+  const Axes axes = AxesOf(plane);
+  const bool is_periodic_along_first = box.axes[static_cast<std::size_t>(axes.first)].has_value();
+  const bool is_periodic_along_second = box.axes[static_cast<std::size_t>(axes.second)].has_value();
+  if (points.size() == 4) {
+    const bool is_image = (!is_periodic_along_first || points[1] == points[3]) &&
+                          (!is_periodic_along_second || points[0] == points[2]);
+    if (is_image) return absl::OkStatus();
+    return Refused(field, "an endless line",
+                   "must be parallel to the periodic axis, so that it meets itself at the faces");
+  }
+  double area = 0;
+  for (std::size_t k = 2; k + 2 < points.size(); k += 2) {
+    area += (points[k] - points[0]) * (points[k + 3] - points[1]) -
+            (points[k + 1] - points[1]) * (points[k + 2] - points[0]);
+  }
+  if (area < 0) return absl::OkStatus();
+  return Refused(field, "a tank",
+                 "must be a clockwise obstacle in a periodic box: give the sides of a channel as "
+                 "endless lines");
+}
+
 // Checks that no other parameter excludes walls. `field`: the parameter with the walls.
 absl::Status CheckOthers(const ReconstructionParameters& p, const std::string& field) {
   const auto refused = [&](std::string_view rule) { return Refused(field, "present", rule); };
@@ -76,7 +102,6 @@ absl::Status CheckOthers(const ReconstructionParameters& p, const std::string& f
   if (p.slice) return refused("must be absent with a slice");
   if (p.isovalue) return refused("must be absent with an isovalue");
   if (!p.sections.empty()) return refused("must be absent with sections: slices, isolines, phases");
-  if (p.box) return refused("must be absent with a periodic box");
   if (p.sizes != Sizes::kEqual) return refused("must be absent unless sizes are equal");
   if (p.placement != Placement::kVirtualPlane) {
     return refused("must be absent unless the placement is virtual-plane");
@@ -114,8 +139,6 @@ absl::Status CheckOthersOfPlanes(const ReconstructionParameters& p) {
   };
   if (p.output != Output::kSurface) return refused("must be absent unless the output is a surface");
   if (!p.sections.empty()) return refused("must be absent with sections: slices, isolines");
-  if (p.box) return refused("must be absent with a periodic box");
-  if (p.sizes != Sizes::kEqual) return refused("must be absent unless sizes are equal");
   return absl::OkStatus();
 }
 
@@ -162,11 +185,25 @@ absl::Status CheckWallPlanes(std::span<const WallPlane> planes, double kernel_ra
   return absl::OkStatus();
 }
 
+absl::Status CheckAxesOfWalls(std::span<const WallPlane> planes,
+                              const std::optional<PeriodicBox>& box) {
+  if (!box) return absl::OkStatus();
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    const auto axis = static_cast<std::size_t>(planes[k].axis);
+    if (!box->axes[axis]) continue;
+    return Refused(absl::StrCat("wall_planes[", k, "].axis"), std::string(1, "xyz"[axis]),
+                   "must not be a periodic axis of the box");
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CheckWalls(const ReconstructionParameters& p) {
   if (!p.wall_planes.empty()) {
     absl::Status status = CheckOthersOfPlanes(p);
-    if (status.ok())
+    if (status.ok()) {
       status = CheckWallPlanes(p.wall_planes, p.kernel_radius, p.spacing.value_or(0));
+    }
+    if (status.ok()) status = CheckAxesOfWalls(p.wall_planes, p.box);
     if (!status.ok()) return status;
   }
   if (absl::Status status = CheckWallPhases(p); !status.ok()) return status;
@@ -181,7 +218,9 @@ absl::Status CheckWalls(const ReconstructionParameters& p) {
   if (absl::Status status = CheckOthers(p, "walls"); !status.ok()) return status;
   for (std::size_t k = 0; k < p.walls.size(); ++k) {
     const std::string field = absl::StrCat("walls[", k, "].points");
-    if (absl::Status status = CheckPoints(field, p.walls[k].points); !status.ok()) return status;
+    absl::Status status = CheckPoints(field, p.walls[k].points);
+    if (status.ok() && p.box) status = CheckInBox(field, p.walls[k].points, *p.box, p.plane);
+    if (!status.ok()) return status;
   }
   return absl::OkStatus();
 }

@@ -1,6 +1,7 @@
 // The rules of walls.
 #pragma once
 
+#include <optional>
 #include <span>
 
 #include "absl/status/status.h"
@@ -18,5 +19,9 @@ absl::Status CheckWalls(const ReconstructionParameters& parameters);
 /// than a kernel radius. Errors: INVALID_ARGUMENT with the Violation of the first broken rule.
 absl::Status CheckWallPlanes(std::span<const WallPlane> planes, double kernel_radius,
                              double spacing);
+
+/// Checks that no wall lies across a periodic axis. Errors: INVALID_ARGUMENT.
+absl::Status CheckAxesOfWalls(std::span<const WallPlane> planes,
+                              const std::optional<PeriodicBox>& box);
 
 }  // namespace partiemc

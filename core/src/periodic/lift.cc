@@ -276,14 +276,16 @@ void WritePositions(const Grid& grid, std::span<const Real> given, std::size_t c
 // Checks that no particle is too far away to be wrapped.
 template <typename Real>
 absl::Status CheckDistances(const Grid& grid, std::span<const Real> positions,
-                            std::size_t components) {
+                            std::size_t components, std::span<const std::uint32_t> names) {
   for (std::size_t first = 0; first < positions.size(); first += components) {
     for (std::size_t axis = 0; axis < components; ++axis) {
       const auto at = static_cast<double>(positions[first + axis]);
       if (std::abs(at - grid.origin[axis]) <= kMostLengths * grid.length[axis]) continue;
       if (grid.length[axis] == 0) continue;
+      const std::size_t particle = first / components;
+      const std::size_t name = names.empty() ? particle : names[particle];
       return InvalidFrame(kReasonOutOfRange,
-                          CoordinateField("positions", first / components, static_cast<int>(axis)),
+                          CoordinateField("positions", name, static_cast<int>(axis)),
                           ShortestNumber(at), "must be at most 1e6 lengths away from the box");
     }
   }
@@ -420,7 +422,7 @@ absl::Status Lift(const LiftInput& input, LiftScratch& s, LiftedFrame& lifted) {
   const Grid grid = MakeGrid(input);
   const auto components = static_cast<std::size_t>(input.frame.components);
   absl::Status checked =
-      std::visit([&](auto positions) { return CheckDistances(grid, positions, components); },
+      std::visit([&](auto of) { return CheckDistances(grid, of, components, input.names); },
                  input.frame.positions);
   std::uint64_t bytes = kBytesPerLiftedParticle * input.frame.ParticleCount();
   if (checked.ok()) checked = input.reserve(bytes);

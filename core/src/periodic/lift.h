@@ -55,6 +55,8 @@ inline constexpr std::uint64_t kBytesPerLiftCell = sizeof(LiftCell) + sizeof(std
 struct LiftInput {
   const Frame& frame;
   const PeriodicBox& box;
+  /// By particle: the caller's number of it, for errors. Empty: its index in `frame`.
+  std::span<const std::uint32_t> names = {};
   /// The coordinates that count: two for outlines, three for surfaces. The others stay as they are.
   std::span<const int> axes;
   /// Particles at most this far apart are in one cluster. World units.

@@ -46,15 +46,15 @@ struct SpaceBins {
   std::vector<float> weight;          ///< Padded. Empty without volumes, and also with own sizes.
   std::vector<float> size;            ///< Own sizes in spacings, padded; empty for equal sizes.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
-  /// Images: particles of the frame from this index on, which are mirror images behind walls or
-  /// copies beyond the faces of a periodic box. They count for F, but not as particles of a body.
+  /// Images: particles of the frame from this index on. They count for F, but not as particles of
+  /// a body. First come copies beyond the faces of a periodic box, then mirror images behind walls.
   /// kNoIndex: no images.
   std::uint32_t first_image = kNoIndex;
-  /// True: images are mirror images, and their attributes are ignored. False: images are copies,
-  /// and their attributes count.
-  bool are_images_mirrored = true;
+  /// The first mirror image. Attributes of mirror images are ignored. kNoIndex: none.
+  std::uint32_t first_mirror = kNoIndex;
 
   bool IsImage(std::uint32_t particle) const { return source[particle] >= first_image; }
+  bool IsMirror(std::uint32_t particle) const { return source[particle] >= first_mirror; }
 
   struct Keyed {
     std::uint64_t key;  // Class, cell and place in the cell.

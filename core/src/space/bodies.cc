@@ -189,8 +189,12 @@ void CountParticles(const Frame& frame, const SpaceBins& bins, const SpaceField&
       bodies.body_of_particle[p] = index;
       if (index == kNoIndex) continue;
       Body& body = bodies.bodies[index];
+      if (bins.IsMirror(p)) {
+        body.has_mirrors = true;
+        continue;
+      }
       if (bins.IsImage(p)) {
-        ++body.images;
+        ++body.copies;
         continue;
       }
       ++body.particles;

@@ -26,7 +26,8 @@ enum class BodyFate : std::uint8_t {
 struct Body {
   BrickPlace lowest{};          ///< One of its nodes with the smallest z.
   std::uint64_t particles = 0;  ///< Number of its particles, without images.
-  std::uint64_t images = 0;     ///< Number of its images (SpaceBins::first_image).
+  std::uint64_t copies = 0;     ///< Number of its particles that are copies.
+  bool has_mirrors = false;     ///< Whether it has mirror images of particles (SpaceBins).
   double volume = 0;            ///< Volume of `particles`, world units cubed.
   BodyFate fate = BodyFate::kWhole;
   bool is_complete = false;  ///< A cut body that lacks no part. Only in a box that wraps.

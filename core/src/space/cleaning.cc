@@ -95,7 +95,8 @@ DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bod
   std::uint32_t kept = 0;
   for (std::size_t index = 0; index < bodies.bodies.size(); ++index) {
     const Body& body = bodies.bodies[index];
-    const bool is_gone = body.fate == BodyFate::kGone || (body.particles == 0 && body.images > 0);
+    const bool has_images = body.copies > 0 || body.has_mirrors;
+    const bool is_gone = body.fate == BodyFate::kGone || (body.particles == 0 && has_images);
     const bool is_empty = limits.drops_empty && body.particles == 0;
     const bool is_spray =
         body.volume < limits.least_volume || body.particles < limits.least_particles;

@@ -12,7 +12,8 @@ struct AxisPlane {
   int axis = 0;  ///< The coordinate that is constant on the plane: 0, 1, 2 for x, y, z.
   double at = 0;
   bool keeps_above =
-      true;  ///< Whether points with a larger coordinate are kept, else smaller ones.
+      true;              ///< Whether points with a larger coordinate are kept, else smaller ones.
+  bool is_wall = false;  ///< A wall; else a face of a periodic box (CutSurface).
 };
 
 /// The two axes in a plane, in the order for which a cap lies on the left of its edges.

@@ -89,21 +89,22 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
     ThrowIfCancelled();
     // Opposite faces of a box move alike. A wall moves alone: the opposite one may be far away.
     const double far =
-        input.are_walls ? std::abs(plane.at) : farthest[static_cast<std::size_t>(plane.axis)];
+        plane.is_wall ? std::abs(plane.at) : farthest[static_cast<std::size_t>(plane.axis)];
     const double step =
         kShiftSpacings * input.spacing + kShiftBits * std::numeric_limits<double>::epsilon() * far;
     const double move = shift * step * kShiftAlong[static_cast<std::size_t>(plane.axis)];
-    plane.at += input.are_walls && !plane.keeps_above ? -move : move;
+    plane.at += plane.is_wall && !plane.keeps_above ? -move : move;
     if (!InSpaceDomain(plane.at)) plane.at = 0;
     if (!CutAtPlane(plane, kClearance * step, s.plane, s.mesh)) return false;
   }
   return CapPlanes(input.inner_step, s.plane, s.mesh);
 }
 
-/// Moves the points of caps to the given planes.
-void ReturnToPlanes(const SurfaceCutInput& input, CutMesh& mesh) {
+/// Moves the points of caps on walls to the given planes.
+void ReturnToWalls(const SurfaceCutInput& input, CutMesh& mesh) {
   for (std::size_t cap = 0; cap < input.planes.size(); ++cap) {
     const AxisPlane& plane = input.planes[cap];
+    if (!plane.is_wall) continue;
     for (std::size_t k = 3 * std::size_t{mesh.cap_offsets[cap]};
          k < 3 * std::size_t{mesh.cap_offsets[cap + 1]}; ++k) {
       mesh.points[3 * std::size_t{mesh.triangles[k]} + static_cast<std::size_t>(plane.axis)] =
@@ -382,15 +383,16 @@ void Assembly::WriteParents() {
 bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePieces& pieces,
                 Surface& surface) {
   // With walls, the second half of the tries leaves the points where the cuts are.
-  const std::size_t shifts = input.are_walls ? kShiftsOfWalls : kShifts.size();
-  const std::size_t tries = input.are_walls ? 2 * shifts : shifts;
+  const bool has_walls = std::ranges::any_of(input.planes, &AxisPlane::is_wall);
+  const std::size_t shifts = has_walls ? kShiftsOfWalls : kShifts.size();
+  const std::size_t tries = has_walls ? 2 * shifts : shifts;
   for (std::size_t attempt = 0; attempt < tries; ++attempt) {
     ThrowIfCancelled();
     const double shift = kShifts[attempt % shifts];
     FillMesh(input, surface, s.plane, s.mesh);
     if (!CutAtPlanes(input, shift, s)) continue;
-    const bool returns = input.are_walls && shift != 0 && attempt < shifts;
-    if (returns) ReturnToPlanes(input, s.mesh);
+    const bool returns = has_walls && shift != 0 && attempt < shifts;
+    if (returns) ReturnToWalls(input, s.mesh);
     Assembly(input, surface, s, pieces).Run();
     if (returns && !Validate(s.surface).ok()) continue;
     s.surface.statistics = surface.statistics;

@@ -13,7 +13,7 @@ namespace partiemc::space {
 
 struct SurfaceCutInput {
   /// Shells lose their parts beyond each plane. Requires: planes with the same axis are at least a
-  /// millionth of the spacing apart.
+  /// millionth of the spacing apart, and all or none of them are walls.
   std::span<const AxisPlane> planes;
   /// By shell: whether it is cut. Empty: all are. Requires: the same value for a shell and its
   /// cavities.
@@ -24,10 +24,6 @@ struct SurfaceCutInput {
   double spacing = 1;  ///< World units.
   /// Step of the inner points of the faces on the planes, world units; 0 for no inner points.
   double inner_step = 0;
-  /// The planes are walls: if they must move (see CutSurface), they move to the side that is kept.
-  /// The points on a moved plane then return to the wall, if Validate accepts this surface. If
-  /// Validate rejects the surface for every move, these points stay on the moved plane.
-  bool are_walls = false;
 };
 
 /// Warm buffers of CutSurface.
@@ -73,7 +69,9 @@ struct SurfacePieces {
 ///
 /// If a vertex lies on a plane, or rounding leaves a decision open, all planes move. Those with the
 /// same axis move alike, by up to .00021 spacings plus 3e-9 of their largest coordinate (kShifts in
-/// surface_cut.cc). Walls move by at most a sixth of this, each on its own. Returns false, with
+/// surface_cut.cc). Walls move each on its own, to the side that is kept, and then planes move by
+/// at most a sixth of this. The points on a moved wall return to the wall, if Validate accepts this
+/// surface. If Validate rejects it for every move, they stay on the moved wall. Returns false, with
 /// `surface` unchanged, if this does not help, which is a bug. Requires: S1 to S5;
 /// `surface.attributes` without values. Deterministic. Cost: linear in the surface, plus CutAtPlane
 /// and CapPlanes, plus ShellsAround if a shell with a cavity falls into several parts. Throws

@@ -174,8 +174,9 @@ void FindShellsOfParticles(const ShellInput& input, NumberedShells& shells) {
   for (std::uint32_t p = 0; p < body_of.size(); ++p) {
     if (body_of[p] == kNoIndex || body_of[p] == kDroppedBody) continue;
     // Copies count for bodies that are not cut.
-    const bool counts_images = !input.bins.are_images_mirrored && !input.bodies.IsCut(body_of[p]);
-    if (input.bins.IsImage(p) && !counts_images) continue;
+    if (input.bins.IsMirror(p) || (input.bins.IsImage(p) && input.bodies.IsCut(body_of[p]))) {
+      continue;
+    }
     const std::uint32_t number = shells.number[shells.shell_of_body[body_of[p]]];
     shells.of_particle[p] = number;
     ++shells.particles[number];

@@ -77,13 +77,13 @@ void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies
   }
   for (std::uint32_t p = 0; p < count; ++p) {
     if (p % kItemsPerCheck == 0) ThrowIfCancelled();
-    s.body_of[input.bins.source[p]] = bodies.body_of_particle[p];
+    if (!input.bins.IsMirror(p)) s.body_of[input.bins.source[p]] = bodies.body_of_particle[p];
   }
   const double usual = input.spacing * input.spacing * input.spacing;
   for (std::uint32_t p = 0; p < count; ++p) {
     if (p % kItemsPerCheck == 0) ThrowIfCancelled();
     const std::uint32_t body = bodies.body_of_particle[p];
-    if (body == kNoIndex || !input.bins.IsImage(p)) continue;
+    if (body == kNoIndex || !input.bins.IsImage(p) || input.bins.IsMirror(p)) continue;
     s.images[body].has_copies = true;
     // Near the end of the copies the level set is wrong, so it may connect bodies.
     if (!IsWithin(input, PositionOf(frame, input.bins.source[p]))) continue;
@@ -99,7 +99,10 @@ void JoinImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodies
   }
   for (std::uint32_t p = 0; p < count; ++p) {
     if (p % kItemsPerCheck == 0) ThrowIfCancelled();
-    if (bodies.body_of_particle[p] != kNoIndex || (input.bins.IsImage(p) && !input.wraps)) continue;
+    if (bodies.body_of_particle[p] != kNoIndex || (input.bins.IsImage(p) && !input.wraps) ||
+        input.bins.IsMirror(p)) {
+      continue;
+    }
     const std::uint32_t original = input.lifted.OriginalOf(input.bins.source[p]);
     if (s.body_of[original] != kNoIndex) bodies.body_of_particle[p] = kDroppedBody;
   }
@@ -131,7 +134,7 @@ void FindBest(const BodyImageInput& input, const Bodies& bodies, std::vector<Ima
     if (set.best == kNoIndex) continue;
     const Body& best = bodies.bodies[set.best];
     // Fewer: particles are missing. More: the image has a particle and its copy.
-    if (best.particles + best.images != set.particles) set.best = kNoIndex;
+    if (best.particles + best.copies != set.particles) set.best = kNoIndex;
   }
 }
 
@@ -150,7 +153,7 @@ void ChooseImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodi
     if (!set.has_copies || (set.best == index && !input.wraps)) continue;
     body.fate = input.wraps || set.best == kNoIndex ? BodyFate::kCut : BodyFate::kGone;
     body.is_complete = input.wraps && IsComplete(input, s.images[index]) &&
-                       s.images[index].given + body.images == set.particles;
+                       s.images[index].given + body.copies == set.particles;
     body.first_image = root;
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "base/parallel.h"
 
@@ -30,14 +31,15 @@ ClipBox Relative(const ClipBox& box, double units, const Vec3& origin) {
   return {units * box.low - origin, units * box.high - origin};
 }
 
-/// Whether the measures of a body count only its part in `volumes.clip`.
-bool IsClipped(const BodyVolumes& volumes, const Bodies& bodies, std::uint32_t body) {
-  return volumes.clip && (!volumes.clips_images || bodies.IsCut(body));
+/// The box to which the measures of a body are restricted; absent for its whole volume.
+const std::optional<ClipBox>& ClipOf(const BodyVolumes& volumes, const Bodies& bodies,
+                                     std::uint32_t body) {
+  return volumes.in_box && bodies.IsCut(body) ? volumes.in_box : volumes.before_walls;
 }
 
-/// Gives all images of a body the sum of their measures.
+/// Gives all images of a body the sum of their measures, so that they move alike.
 void ShareMeasures(const Bodies& bodies, BodyVolumes& volumes) {
-  if (!volumes.clips_images) return;
+  if (!volumes.in_box) return;
   for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
     const std::uint32_t first = bodies.bodies[body].first_image;
     if (first == body) continue;
@@ -92,7 +94,7 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
   ForEachLoopOfCells(crossings, [&](const ActiveCell& cell, int loop, std::uint32_t index) {
     const std::uint32_t vertex = crossings.edge_count + index;
     const std::uint32_t body = volumes.body_of[vertex];
-    const bool is_clipped = IsClipped(volumes, bodies, body);
+    const std::optional<ClipBox>& clip = ClipOf(volumes, bodies, body);
     const Vec3 origin = origin_of(body);
     const Vec3 a = positions[vertex] - origin;
     double area = 0;
@@ -100,9 +102,9 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
     ForEachCurve(crossings, cell, loop, [&](std::uint32_t from, std::uint32_t to) {
       const Vec3 b = positions[from] - origin, c = positions[to] - origin;
       area += Length(Cross(b - a, c - a)) / 2;
-      if (is_clipped) {
+      if (clip) {
         const ClippedMeasure clipped =
-            MeasureClipped(a, b, c, Relative(*volumes.clip, 1 / cell_size, origin));
+            MeasureClipped(a, b, c, Relative(*clip, 1 / cell_size, origin));
         part.area += clipped.area;
         part.volume += clipped.volume;
       } else {
@@ -110,7 +112,7 @@ void MeasureBodies(const BrickDirectory& bricks, const SpaceCrossings& crossings
       }
     });
     volumes.areas[index] = area;
-    if (!is_clipped) part.area = area;
+    if (!clip) part.area = area;
     volumes.parts[index] = part;
   });
   volumes.measures.assign(bodies.bodies.size(), {});
@@ -132,10 +134,10 @@ void MeasureTriangles(const BrickDirectory& bricks, double cell_size, const Bodi
     const Vec3 origin = cell_size * LowestNodeOf(bricks, bodies.bodies[body]);
     const Vec3 a = positions[triangle[0]] - origin, b = positions[triangle[1]] - origin,
                c = positions[triangle[2]] - origin;
-    const bool is_clipped = IsClipped(volumes, bodies, body);
+    const std::optional<ClipBox>& clip = ClipOf(volumes, bodies, body);
     const ClippedMeasure part =
-        is_clipped ? MeasureClipped(a, b, c, Relative(*volumes.clip, 1, origin))
-                   : ClippedMeasure{Length(Cross(b - a, c - a)) / 2, Dot(a, Cross(b, c)) / 6};
+        clip ? MeasureClipped(a, b, c, Relative(*clip, 1, origin))
+             : ClippedMeasure{Length(Cross(b - a, c - a)) / 2, Dot(a, Cross(b, c)) / 6};
     double area = part.area;
     if (!volumes.sizes.empty()) {
       area *= (volumes.SizeOf(triangle[0]) + volumes.SizeOf(triangle[1]) +

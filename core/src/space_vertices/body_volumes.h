@@ -32,12 +32,10 @@ struct BodyVolumes {
 
   double SizeOf(std::size_t vertex) const { return sizes.empty() ? 1 : double{sizes[vertex]}; }
 
-  /// With walls, the space before them; with copies of particles, the periodic box. In world units.
-  /// `measures` count only the parts of bodies in it.
-  std::optional<ClipBox> clip;
-  /// For copies: clips only bodies that are cut, and gives all images of a body the sum of their
-  /// measures, so that they move alike.
-  bool clips_images = false;
+  /// The space before the walls, and its part in the periodic box; absent without walls and without
+  /// copies of particles. World units. `measures` count only the part of a body in `before_walls`,
+  /// and of a body that is cut at the box only the part in `in_box`.
+  std::optional<ClipBox> before_walls, in_box;
 
   struct Part {
     double area = 0, volume = 0;

@@ -226,8 +226,8 @@ void FindDrops(const DropsInput& input, const DropLimits& limits, NodesAre nodes
       if (p % kItemsPerCheck == 0) ThrowIfCancelled();
       const std::uint32_t body = bodies.body_of_particle[p];
       if (body == kDroppedBody || (body != kNoIndex && drops.drop_of[body] == kNoIndex)) continue;
-      const bool is_image = bins.IsImage(p);
-      if (body == kNoIndex && is_image && !input.takes_copies) continue;
+      const bool is_alone = !bins.IsImage(p) || (input.takes_copies && !bins.IsMirror(p));
+      if (body == kNoIndex && !is_alone) continue;
       const Vec3 within{input.bins.x[p], input.bins.y[p], input.bins.z[p]};
       const Vec3 at = origin + within;
       const double volume =

@@ -87,7 +87,7 @@ void InterpolateInSpace(const Frame& frame, const SpaceBins& bins, const Scale& 
         // Offsets in local sizes keep the fit well conditioned.
         const double unit = 1 / around.Size();
         around.ForEach([&](std::uint32_t p, double weight, const Vec3& to, double) {
-          if (bins.are_images_mirrored && bins.IsImage(p)) return;
+          if (bins.IsMirror(p)) return;
           const Vec3 scaled = unit * to;
           fit.Add(weight, scaled.x, scaled.y, scaled.z);
           carried.Add(frame.attributes, bins.source[p], weight, scaled.x, scaled.y, scaled.z);

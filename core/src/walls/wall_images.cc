@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "absl/strings/str_cat.h"
+#include "base/bits.h"
 #include "base/cancellation.h"
 #include "frame/frame_view.h"
 #include "partiemc/status.h"
@@ -41,12 +42,24 @@ std::span<const Value> Gather(std::span<const Value> from, std::size_t component
   return to;
 }
 
-// Calls visit(position, number) for the particles that have an effect. Those nearer to a wall than
-// `nearest`, or behind it, move to this distance before it, so that each has an image.
+// The size of a particle: the unit of the lengths of WallImageInput. 1 for equal sizes.
+double SizeOf(const WallImageInput& input, std::size_t particle) {
+  return input.kernel_radius > 0 ? CubeRoot(double{input.frame.volumes[particle]}) : 1;
+}
+
+// How far before a wall a particle has an image.
+double DepthOf(const WallImageInput& input, std::size_t particle) {
+  return input.depth > 0 ? input.depth + input.kernel_radius * SizeOf(input, particle) : 0;
+}
+
+// Calls visit(position, number) for the particles that have an effect. Those that are nearer to a
+// wall than `nearest`, or behind it, move to this distance before it, so that each has an image.
 template <typename Real, typename Visit>
-void ForEachNear(std::span<const Real> positions, const FluidBox& box, double tolerance,
-                 double nearest, const Visit& visit) {
+void ForEachNear(std::span<const Real> positions, const WallImageInput& input, const FluidBox& box,
+                 const Visit& visit) {
   for (std::size_t particle = 0; particle < positions.size() / kAxes; ++particle) {
+    const double size = SizeOf(input, particle);
+    const double tolerance = input.tolerance * size, nearest = input.nearest * size;
     std::array<double, kAxes> at;
     bool is_near = true;
     for (std::size_t k = 0; k < kAxes; ++k) {
@@ -69,7 +82,8 @@ std::uint64_t CountImages(const std::array<double, kAxes>& at, const FluidBox& b
 }
 
 // Appends the images along one axis of all particles so far.
-void MirrorAlong(std::size_t axis, const FluidBox& box, double depth, WallImageScratch& s) {
+void MirrorAlong(std::size_t axis, const WallImageInput& input, const FluidBox& box,
+                 WallImageScratch& s) {
   const std::size_t count = s.originals.size();
   const auto add = [&](std::size_t particle, double wall) {
     for (std::size_t k = 0; k < kAxes; ++k) {
@@ -86,6 +100,7 @@ void MirrorAlong(std::size_t axis, const FluidBox& box, double depth, WallImageS
   for (std::size_t particle = 0; particle < count; ++particle) {
     const double at = s.positions[kAxes * particle + axis];
     const double above = at - box.low[axis], below = box.high[axis] - at;
+    const double depth = DepthOf(input, s.originals[particle]);
     if (above > 0 && above <= depth) add(particle, box.low[axis]);
     if (below > 0 && below <= depth) add(particle, box.high[axis]);
   }
@@ -107,13 +122,11 @@ absl::Status AddWallImages(const WallImageInput& input, WallImageScratch& s, Fra
   const Frame& given = input.frame;
   const FluidBox box = FluidBoxOf(input.planes);
   const auto for_each_near = [&](const auto& visit) {
-    std::visit(
-        [&](auto positions) { ForEachNear(positions, box, input.tolerance, input.nearest, visit); },
-        given.positions);
+    std::visit([&](auto positions) { ForEachNear(positions, input, box, visit); }, given.positions);
   };
   std::uint64_t all = 0;
-  for_each_near([&](const std::array<double, kAxes>& at, std::uint32_t) {
-    all += CountImages(at, box, input.depth);
+  for_each_near([&](const std::array<double, kAxes>& at, std::uint32_t particle) {
+    all += CountImages(at, box, DepthOf(input, particle));
   });
   if (all > FrameLimits::kMostParticles) {
     return InvalidFrame(kReasonTooManyParticles, "positions", absl::StrCat(all),
@@ -135,7 +148,7 @@ absl::Status AddWallImages(const WallImageInput& input, WallImageScratch& s, Fra
   particles = s.originals.size();
   s.velocities.reserve(given.velocities.empty() ? 0 : kAxes * all);
   Gather(given.velocities, kAxes, s.originals, s.velocities);
-  for (std::size_t axis = 0; axis < kAxes; ++axis) MirrorAlong(axis, box, input.depth, s);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) MirrorAlong(axis, input, box, s);
   with_images = given;
   with_images.positions = std::span<const double>(s.positions);
   with_images.velocities = s.velocities;

@@ -37,10 +37,16 @@ FluidBox FluidBoxOf(std::span<const WallPlane> planes);
 struct WallImageInput {
   const Frame& frame;
   std::span<const WallPlane> planes;
-  double depth = 0;  ///< Images reach this far behind a wall. World units.
-  /// Particles farther behind a wall than this have no effect. World units.
+  /// Particles have images if they are at most this far before a wall. World units.
+  double depth = 0;
+  /// With own sizes, the kernel radius in sizes: the particles must be nearer than `depth` plus
+  /// their own kernel radius. 0: equal sizes.
+  double kernel_radius = 0;
+  /// Particles farther behind a wall than this have no effect. World units; with own sizes, in
+  /// sizes.
   double tolerance = 0;
-  double nearest = 0;  ///< Closer particles move to this distance before a wall. World units.
+  /// Closer particles move to this distance before a wall. Units as `tolerance`.
+  double nearest = 0;
   /// Called with the bytes that the scratch requires, before they are allocated. Its error ends
   /// AddWallImages.
   absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve;
@@ -48,11 +54,11 @@ struct WallImageInput {
 
 /// Sets `with_images` to particles and their images, a view of `scratch`. The particles come first,
 /// in their order: those before the walls or up to `tolerance` behind one. Particles closer than
-/// `nearest` to a wall or behind it move to this distance before it. `particles`: their number. A
-/// particle has an image behind each wall that it is at most `depth` before. At edges and corners,
-/// images have images behind the walls of the next axes. An image has the id, volume and attributes
-/// of its particle, and its velocity, mirrored.
-/// Requires: CheckFrame has passed the frame, with three components.
+/// `nearest` to a wall or behind it move to this distance before it. `particles`: their number. At
+/// edges and corners, images have images behind the walls of the next axes. An image has the id,
+/// volume and attributes of its particle, and its velocity, mirrored. With `depth` 0 there are no
+/// images.
+/// Requires: CheckFrame has passed the frame, with three components and, with own sizes, volumes.
 /// Errors: INVALID_ARGUMENT (TOO_MANY_PARTICLES) for more than FrameLimits::kMostParticles with the
 /// images; errors of `reserve`. Cost: linear in particles.
 absl::Status AddWallImages(const WallImageInput& input, WallImageScratch& scratch,

@@ -141,7 +141,7 @@ void WallLines::AddEndless(const Point& a, const Point& b, double cell_size, con
   solids_.back().last = first + 1;
 }
 
-void WallLines::Build(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
+void WallLines::Build(std::span<const Wall> walls, const Rings* particle_walls, double cell_size,
                       const Window& window) {
   edges_.clear();
   world_.clear();

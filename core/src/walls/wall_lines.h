@@ -55,7 +55,7 @@ class WallLines {
   /// get further points at the sides of the window, because shares of a long line are not precise.
   /// Successive points that round to the same cell coordinates become one. Requires: Validate has
   /// passed the walls. A slanted line is off by 2^-52 of the distance of its points.
-  void Build(const std::vector<Wall>& walls, const Rings* particle_walls, double cell_size,
+  void Build(std::span<const Wall> walls, const Rings* particle_walls, double cell_size,
              const Window& window);
 
   std::span<const WallEdge> edges() const { return edges_; }

@@ -28,7 +28,8 @@ void WallParticles::Part::Take(const Frame& from) {
   copy.Take(from, sources);
   frame = {.positions = std::span<const double>(positions),
            .components = from.components,
-           .velocities = velocities};
+           .velocities = velocities,
+           .box = from.box};
   copy.View(frame);
 }
 
@@ -59,6 +60,7 @@ absl::Status WallParticles::Take(const Frame& frame, const ReconstructionParamet
   others.attributes = {};
   others.ids = {};
   others.velocities = {};
+  others.box.reset();  // The outline of walls does not need it: walls/wall_copies.h adds images.
   walls_.Take(others);
   return absl::OkStatus();
 }

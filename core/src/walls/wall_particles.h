@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -24,6 +25,8 @@ class WallParticles {
 
   /// Views of this object. Neither has the attribute of the phases.
   const Frame& fluid() const { return fluid_.frame; }
+  /// By particle of the fluid: its number in the given frame.
+  std::span<const std::uint32_t> fluid_sources() const { return fluid_.sources; }
   const Frame& walls() const { return walls_.frame; }
 
  private:

@@ -142,6 +142,34 @@ TEST(PeriodicReplay, LayerIsCutAtTheFaces) {
   EXPECT_EQ(Replayed(csv, remote).digest, cut.digest);
 }
 
+// A layer on two rows of wall particles, or on a line, with an obstacle across the periodic face.
+TEST(PeriodicReplay, WallsAreCutAtTheFaces) {
+  const support::TemporaryFolder folder;
+  const std::string csv = folder.Path("layer.csv");
+  std::ofstream file(csv);
+  file << "x,y,type\n";
+  for (int k = 0; k < 360; ++k) {
+    const int x = k % 30, y = k / 30 - 2;
+    if (y >= 0 && y < 4 && (x < 3 || x >= 27)) continue;
+    file << x + .5 << "," << y + .5 << "," << (y < 0 ? 2 : 1) << "\n";
+  }
+  file.close();
+  ServerProgram server;
+  for (const std::string wall : {"type=2", "0,0,1,0"}) {
+    SCOPED_TRACE(wall);
+    const std::vector<std::string> flags = {"--periodic", "x",  "--box",  "0,30,0,30",
+                                            "--wall",     wall, "--wall", "-3,0,-3,4,3,4,3,0"};
+    std::vector<std::string> local = {"--local", "--check"};
+    local.insert(local.end(), flags.begin(), flags.end());
+    const Columns cut = Replayed(csv, local);
+    ASSERT_THAT(cut.rings, ElementsAre("1"));
+    EXPECT_NEAR(std::stod(cut.area[0]), 300 - 24, 2);
+    std::vector<std::string> remote = {"--server", server.address()};
+    remote.insert(remote.end(), flags.begin(), flags.end());
+    EXPECT_EQ(Replayed(csv, remote).digest, cut.digest);
+  }
+}
+
 TEST(PeriodicReplay, WrongBoxesAreRefused) {
   const support::TemporaryFolder input;
   const auto refusal = [&](const std::string& bounds, const std::vector<std::string>& flags,

@@ -243,13 +243,20 @@ TEST(WallsReplay, WrongWallsAreRefused) {
   EXPECT_THAT(refusal({"--wall", "1,2,1,2"}), HasSubstr("partiemc: --wall number 1: "));
   EXPECT_THAT(refusal({"--wall", kTank, "--wall", "0,0,4,4,4,0,0,4"}),
               HasSubstr("partiemc: --wall number 2: "));
-  for (const std::vector<std::string>& other : {std::vector<std::string>{"--placement", "qef"},
-                                                {"--isolines", ".5"},
-                                                {"--periodic", "x", "--box", "0,40,0,40"}}) {
+  for (const std::vector<std::string>& other :
+       {std::vector<std::string>{"--placement", "qef"}, {"--isolines", ".5"}}) {
     std::vector<std::string> flags = {"--wall", kTank};
     flags.insert(flags.end(), other.begin(), other.end());
     EXPECT_THAT(refusal(flags), HasSubstr("partiemc: --wall: present; ")) << other[0];
   }
+  const auto in_box = [&](const std::string& wall) {
+    return refusal({"--wall", wall, "--periodic", "x", "--box", "0,40,0,40"});
+  };
+  EXPECT_THAT(in_box(kTank), HasSubstr("endless lines"));
+  EXPECT_THAT(in_box("0,0,1,.1"), HasSubstr("parallel to the periodic axis"));
+  EXPECT_THAT(
+      refusal({"--surface", "--wall-plane", "x=0", "--periodic", "x", "--box", "0,40,0,40,0,40"}),
+      HasSubstr("--wall-plane number 1"));
 }
 
 }  // namespace

@@ -144,6 +144,34 @@ SpaceParticles Shaken(SpaceParticles particles, Random& random, double noise) {
   return particles;
 }
 
+SpaceParticles MovedBy(SpaceParticles particles, const Vec3& by) {
+  for (std::size_t k = 0; k < particles.xyz.size(); ++k) {
+    particles.xyz[k] += std::array{by.x, by.y, by.z}[k % 3];
+  }
+  return particles;
+}
+
+void AddSized(SpaceParticles& scene, const SpaceParticles& others) {
+  scene.Add(others);
+  scene.volumes.insert(scene.volumes.end(), others.volumes.begin(), others.volumes.end());
+}
+
+double SumOfVolumes(const SpaceParticles& particles) {
+  double sum = 0;
+  for (const float volume : particles.volumes) sum += volume;
+  return sum;
+}
+
+void DrawSizes(SpaceParticles& particles, double low, double high, Random& random) {
+  particles.volumes.clear();
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    particles.volumes.push_back(static_cast<float>(std::pow(random.Uniform(low, high), 3)));
+  }
+  const auto scale =
+      static_cast<float>(static_cast<double>(particles.size()) / SumOfVolumes(particles));
+  for (float& volume : particles.volumes) volume *= scale;
+}
+
 double MeanSpacing(const SpaceParticles& particles) {
   double volume = 0;
   for (const float of : particles.volumes) volume += of;

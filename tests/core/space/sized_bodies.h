@@ -26,6 +26,17 @@ SpaceParticles RandomSizedScene(std::uint64_t seed, double ratio);
 /// Moves particles at random. The standard deviation along each axis is `noise` times their size.
 SpaceParticles Shaken(SpaceParticles particles, support::Random& random, double noise);
 
+SpaceParticles MovedBy(SpaceParticles particles, const Vec3& by);
+
+/// Adds particles with their volumes.
+void AddSized(SpaceParticles& scene, const SpaceParticles& others);
+
+double SumOfVolumes(const SpaceParticles& particles);
+
+/// Gives each particle a random size between the limits, then scales all, so that the mean volume
+/// is 1.
+void DrawSizes(SpaceParticles& particles, double low, double high, support::Random& random);
+
 /// The cube root of the mean volume.
 double MeanSpacing(const SpaceParticles& particles);
 

@@ -25,11 +25,15 @@
 namespace partiemc {
 namespace {
 
+using support::AddSized;
 using support::BoxOf;
 using support::Cube;
+using support::DrawSizes;
 using support::ExpectInBox;
+using support::MovedBy;
 using support::Random;
 using support::SpaceParticles;
+using support::SumOfVolumes;
 using support::Sums;
 using support::SumsOf;
 using support::SurfaceOf;
@@ -48,37 +52,6 @@ const SpaceParticles& SizedBall() {
                               [](Random& r, const Vec3&) { return r.Uniform(.5, 1.5); });
   }();
   return ball;
-}
-
-SpaceParticles MovedBy(SpaceParticles particles, const Vec3& by) {
-  for (std::size_t k = 0; k < particles.xyz.size(); ++k) {
-    particles.xyz[k] += std::array{by.x, by.y, by.z}[k % 3];
-  }
-  return particles;
-}
-
-void AddSized(SpaceParticles& scene, const SpaceParticles& others) {
-  scene.Add(others);
-  scene.volumes.insert(scene.volumes.end(), others.volumes.begin(), others.volumes.end());
-}
-
-double SumOfVolumes(const SpaceParticles& particles) {
-  double sum = 0;
-  for (const float volume : particles.volumes) sum += volume;
-  return sum;
-}
-
-/// Gives each particle a size of a random one between the limits. The mean volume is 1.
-void DrawSizes(SpaceParticles& particles, double low, double high, Random& random) {
-  double sum = 0;
-  particles.volumes.clear();
-  for (std::size_t k = 0; k < particles.size(); ++k) {
-    particles.volumes.push_back(static_cast<float>(std::pow(random.Uniform(low, high), 3)));
-    sum += particles.volumes.back();
-  }
-  for (float& volume : particles.volumes) {
-    volume *= static_cast<float>(static_cast<double>(particles.size()) / sum);
-  }
 }
 
 /// A layer of a wavy surface across a box of 24 x 20.

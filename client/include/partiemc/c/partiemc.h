@@ -163,8 +163,8 @@ typedef struct partiemc_options {
   /* Walls at which the outline is cut, with the fluid on their left: x and y of each point, wall
    * after wall. Wall k has wall_sizes[k] points. Two points: the endless line through them. More
    * points: a closed polygon, a tank if it is counter-clockwise, an obstacle if it is clockwise. At
-   * most 1024 points together. Excludes surfaces, slices, isovalues, own sizes, phases and `box`.
-   */
+   * most 1024 points together. In a periodic box, endless lines are parallel to the periodic axis,
+   * and polygons are obstacles. Excludes surfaces, slices, isovalues, own sizes and phases. */
   const double* walls;
   const uint32_t* wall_sizes;
   size_t wall_count;
@@ -172,8 +172,8 @@ typedef struct partiemc_options {
    * further wall. At most 16. Excludes the same options as `walls`. */
   const int32_t* wall_phases;
   size_t wall_phase_count;
-  /* Walls at which a surface is cut, at most one for each side of each axis. Excludes outlines,
-   * sections, own sizes and `box`. */
+  /* Walls at which a surface is cut, at most one for each side of each axis, and none across a
+   * periodic axis. Excludes outlines and sections. */
   const partiemc_wall_plane* wall_planes;
   size_t wall_plane_count;
 } partiemc_options;
