@@ -35,8 +35,8 @@ constexpr std::chrono::milliseconds kPollInterval(100);
 constexpr std::chrono::milliseconds kFirstSearchPause(200), kLongestSearchPause(1000);
 
 FrameRecord RecordOf(const WatchedFrame& frame, bool is_surface,
-                     std::span<const float> particle_areas,
-                     std::span<const std::size_t> sections_in_plane) {
+                     std::span<const float> particle_areas, std::span<const float> particle_sizes,
+                     Boundary boundary, std::span<const std::size_t> sections_in_plane) {
   // No output shows particles in space.
   const std::span<const double> particles =
       is_surface ? std::span<const double>() : frame.particles;
@@ -46,6 +46,8 @@ FrameRecord RecordOf(const WatchedFrame& frame, bool is_surface,
           .surface = is_surface ? &frame.frame.result.surface : nullptr,
           .particles = particles,
           .particle_areas = particle_areas,
+          .particle_sizes = particle_sizes,
+          .are_discs = boundary == Boundary::kGrains,
           .stages_ms = frame.frame.times.stages_ms,
           .total_ms = frame.frame.times.total_ms,
           .rings_digest = frame.frame.rings_digest,
@@ -130,7 +132,9 @@ Ended ReceiveAll(const WatchFlags& flags, Watcher& watcher, FrameOutputs& output
                            Plural(frame.gap, "frame")));
     }
     const std::vector<float> areas = AreasOf(frame.particle_volumes, parameters.boundary);
-    absl::Status status = outputs.Write(RecordOf(frame, is_surface, areas, sections_in_plane));
+    const std::vector<float> sizes = SizesOf(frame.particle_volumes, parameters.sizes);
+    absl::Status status = outputs.Write(
+        RecordOf(frame, is_surface, areas, sizes, parameters.boundary, sections_in_plane));
     if (status.ok() && recorder) status = recorder->Add(frame);
     if (!status.ok()) return ended.With(kFailed, OneLine(status));
     progress.Update(++count, Detail(frame, is_surface, ended.dropped));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -29,8 +30,12 @@ struct FrameRecord {
   std::span<const double> particles = {};           ///< x0, y0, x1, y1, ...; or empty.
   std::span<const double> particles_in_space = {};  ///< Of a surface: x0, y0, z0, ...; or empty.
   std::span<const float> particle_areas = {};       ///< One for each of `particles`, or empty.
-  std::array<double, kStageCount> stages_ms = {};   ///< Wall time by stage.
-  double total_ms = 0;                              ///< Wall time of the whole frame.
+  /// With own sizes, the size of each of `particles` in world units: the side of a square with its
+  /// volume. Empty: all have the spacing.
+  std::span<const float> particle_sizes = {};
+  bool are_discs = false;  ///< Particles are discs (grains), and `particle_sizes` their diameters.
+  std::array<double, kStageCount> stages_ms = {};  ///< Wall time by stage.
+  double total_ms = 0;                             ///< Wall time of the whole frame.
   std::uint64_t rings_digest = 0;
   std::uint64_t mesh_digest = 0;
   std::uint64_t surface_digest = 0;
@@ -90,6 +95,14 @@ inline std::vector<float> AreasOf(std::span<const float> volumes, Boundary bound
     for (float& area : areas) area *= std::numbers::pi_v<float> / 4;
   }
   return areas;
+}
+
+/// FrameRecord::particle_sizes of particles with these volumes.
+inline std::vector<float> SizesOf(std::span<const float> volumes, Sizes sizes) {
+  std::vector<float> of;
+  if (sizes == Sizes::kEqual) return of;
+  for (const float volume : volumes) of.push_back(std::sqrt(volume));
+  return of;
 }
 
 /// Indices of the sections that lie in the plane of the stream's own outline: isolines and phases.

@@ -62,6 +62,8 @@ class Encoder : public ReportBytes {
     last_ = point;
   }
 
+  void Length(double length) { Count(static_cast<std::size_t>(std::llround(length / step_))); }
+
   void Points(std::span<const double> points) {
     for (std::size_t k = 0; k < points.size(); k += 2) Point(Quantise(points[k], points[k + 1]));
   }
@@ -146,6 +148,14 @@ void EncodeParticles(std::span<const double> particles, std::span<const std::siz
   }
 }
 
+void EncodeSizes(const FrameRecord& frame, std::span<const std::size_t> shown, Encoder& encoder) {
+  const bool has_sizes = frame.particle_sizes.size() == frame.particles.size() / 2;
+  encoder.Count(frame.are_discs ? 1 : 0);
+  encoder.Count(has_sizes ? shown.size() : 0);
+  if (!has_sizes) return;
+  for (const std::size_t particle : shown) encoder.Length(double{frame.particle_sizes[particle]});
+}
+
 void EncodeSections(const Result& result, Encoder& encoder) {
   encoder.Count(result.sections.size());
   for (const Result& section : result.sections) EncodeRingPoints(section.rings, encoder);
@@ -201,6 +211,7 @@ std::string EncodeReportGeometry(const FrameRecord& frame, const ReportGeometryO
   const std::vector<std::size_t> shown =
       ShownParticles(frame.particles, options.max_particles, encoder);
   EncodeParticles(frame.particles, shown, encoder);
+  EncodeSizes(frame, shown, encoder);
   EncodeSections(frame.result, encoder);
   EncodeColors(frame, options, shown, encoder);
   return encoder.Take();

@@ -28,6 +28,8 @@ struct ReportGeometryOptions {
 ///   triangles   shared (1 if the mesh shares the points of the rings), count; per triangle
 ///               (a - previous a) * 2 + interior, b - a, c - a
 ///   particles   count; x, y differences, in an order that keeps them small
+///   sizes       1 if the particles are discs, else 0; count (0 or the number of particles); per
+///               particle its own size in steps
 ///   sections    count; per section: count of rings, per ring as above; x, y differences of
 ///               all points
 ///   colours     count of channels (color_map.h, 0 without an attribute); per channel two lists:

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 #include <set>
 #include <string>
@@ -97,6 +98,8 @@ double WettedLength(const Rings& rings) {
 
 // In degrees; NaN without contacts.
 double MeanContactAngle(const Rings& rings) {
+  // The quotient below would be a NaN with a sign, "-nan".
+  if (rings.contact_angles.empty()) return std::numeric_limits<double>::quiet_NaN();
   double sum = 0;
   for (const float angle : rings.contact_angles) sum += angle;
   return sum / static_cast<double>(rings.contact_angles.size()) * (180 / std::numbers::pi);

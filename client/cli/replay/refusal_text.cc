@@ -41,6 +41,11 @@ std::string RefusalText(const RecordedFrame& frame, std::span<const std::string>
            "radius";
   }
   std::string_view rest = message;
+  for (const std::string_view axis : {"x", "y", "z"}) {
+    const std::string field = Concat("parameters.box.", axis, ".length");
+    if (!rest.starts_with(field)) continue;
+    return Concat("the length of the periodic box along ", axis, rest.substr(field.size()));
+  }
   if (const auto particle = TakeIndex("volumes", rest);
       particle && *particle < frame.ParticleCount()) {
     return Concat(VolumeName(frame, *particle), rest);

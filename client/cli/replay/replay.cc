@@ -135,7 +135,7 @@ class Receiver {
       // A loop has no outputs.
       if (!flags_.loop) {
         const AttributeValues color = ParticleColor(*frame);
-        const std::vector<float> areas = ParticleAreas(*frame);
+        const std::vector<float> areas = ParticleAreas(*frame), sizes = ParticleSizes(*frame);
         status = outputs_.Write({.index = frame->index,
                                  .time = event_.time,
                                  .result = event_.frame.result,
@@ -143,6 +143,8 @@ class Receiver {
                                  .particles = PlaneParticles(*frame),
                                  .particles_in_space = SpaceParticles(*frame),
                                  .particle_areas = areas,
+                                 .particle_sizes = sizes,
+                                 .are_discs = HasGrains(),
                                  .stages_ms = event_.frame.times.stages_ms,
                                  .total_ms = event_.frame.times.total_ms,
                                  .rings_digest = event_.frame.rings_digest,
@@ -185,6 +187,14 @@ class Receiver {
       return areas;
     }
     return AreasOf(frame.volumes, stream_.info().parameters.boundary);
+  }
+
+  bool HasGrains() const { return stream_.info().parameters.boundary == Boundary::kGrains; }
+
+  /// The sizes with which the particles are drawn; empty for equal sizes, and for 3D particles.
+  std::vector<float> ParticleSizes(const RecordedFrame& frame) const {
+    if (frame.components != 2) return {};
+    return SizesOf(frame.volumes, stream_.info().parameters.sizes);
   }
 
   /// The attribute of --color-by at the particles, for the report; empty without one.

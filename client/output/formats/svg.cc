@@ -2,6 +2,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -21,6 +23,8 @@ constexpr double kSteps = 1000;
 constexpr double kDotSpacings = 0.4;  // In spacings.
 constexpr double kDefaultDot = 1.5;   // In SVG units, if the spacing is unknown.
 constexpr double kSmallestDot = 0.4;  // Lower limit, in SVG units.
+// Diameters of dots of own sizes are rounded to this, in SVG units, so that many share a path.
+constexpr double kDotStep = 0.05;
 
 // Colours of the page's light theme (client/viewer/src/draw/colours.ts).
 constexpr const char* kStyle =
@@ -28,6 +32,7 @@ constexpr const char* kStyle =
     ".inside{fill:#dfecf7;fill-rule:evenodd}"
     ".mesh{fill:none;stroke:#5f93c0;stroke-width:.6}"
     ".particles{fill:none;stroke:#44596b}"
+    ".grains{fill:none;stroke:#44596b;stroke-opacity:.4}"
     ".outline{fill:none;stroke:#0b4f86;stroke-width:2}"
     ".isoline{fill:none;stroke:#a3470f;stroke-width:1}"
     ".bands path{stroke-width:.7}"
@@ -95,13 +100,33 @@ void AppendDot(std::string& path, const double* point, const Picture& picture) {
   path += "h0";
 }
 
-std::string ParticlePath(std::span<const double> particles, const Picture& picture) {
-  std::string path;
-  for (std::size_t k = 0; k + 1 < particles.size(); k += 2) {
-    if (!std::isfinite(particles[k]) || !std::isfinite(particles[k + 1])) continue;
-    AppendDot(path, &particles[k], picture);
+/// The diameter of the dot of a particle, in SVG units. With own sizes, a share of the particle's
+/// size; grains are drawn as large as they are.
+double DotOf(const FrameRecord& frame, std::size_t particle, const Picture& picture) {
+  if (!frame.particle_sizes.empty()) {
+    const double share = frame.are_discs ? 1 : kDotSpacings;
+    const double size = share * double{frame.particle_sizes[particle]} * picture.scale();
+    return kDotStep * std::round(std::clamp(size, kSmallestDot, kLongerSide) / kDotStep);
   }
-  return path;
+  const double spacing = frame.result.statistics.spacing;
+  if (!(spacing > 0)) return kDefaultDot;
+  return std::clamp(kDotSpacings * spacing * picture.scale(), kSmallestDot, kLongerSide);
+}
+
+/// Appends a path of the particles for each diameter.
+void AppendParticles(std::string& out, const FrameRecord& frame, const Picture& picture) {
+  std::map<double, std::string> paths;
+  for (std::size_t k = 0; k < frame.particles.size() / 2; ++k) {
+    const double* const at = &frame.particles[2 * k];
+    if (!std::isfinite(at[0]) || !std::isfinite(at[1])) continue;
+    AppendDot(paths[DotOf(frame, k, picture)], at, picture);
+  }
+  for (const auto& [diameter, path] : paths) {
+    AppendAll(out, R"(<path class=")", frame.are_discs ? "grains" : "particles",
+              R"(" stroke-width=")");
+    AppendNumber(out, std::round(diameter * kSteps) / kSteps);
+    AppendAll(out, R"(" d=")", path, "\"/>\n");
+  }
 }
 
 std::string ContactPath(const Rings& rings, const Picture& picture) {
@@ -219,15 +244,7 @@ std::string EncodeSvg(const FrameRecord& frame, const FrameWriterOptions& option
   const bool inside = values.size() == mesh.PointCount() && !mesh.triangles.empty();
   if (inside) AppendBands(out, "bands", InsideByBand(mesh, values, range, picture));
   AppendAll(out, R"(<path class="mesh" d=")", EdgePath(frame.result.mesh, picture), "\"/>\n");
-  if (dots) {
-    const double spacing = frame.result.statistics.spacing;
-    const double dot = spacing > 0 ? std::clamp(kDotSpacings * spacing * picture.scale(),
-                                                kSmallestDot, kLongerSide)
-                                   : kDefaultDot;
-    out += R"(<path class="particles" stroke-width=")";
-    AppendNumber(out, std::round(dot * kSteps) / kSteps);
-    AppendAll(out, R"(" d=")", ParticlePath(frame.particles, picture), "\"/>\n");
-  }
+  if (dots) AppendParticles(out, frame, picture);
   AppendAll(out, R"(<path class="outline" d=")", OutlinePath(frame.result.rings, picture),
             "\"/>\n");
   if (!frame.result.rings.contacts.empty()) {

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { create } from '@bufbuild/protobuf';
-import { PositionFormat, ReconstructedFrameSchema } from '@proto/v1/reconstruction_pb';
+import { Boundary, PositionFormat, ReconstructedFrameSchema, Sizes } from '@proto/v1/reconstruction_pb';
 import { bytesOf } from '../src/protocol/arrays';
 import { AttributeChannels, channelLabel } from '../src/protocol/channels';
 import { decodeFrame } from '../src/protocol/decode';
@@ -43,6 +43,19 @@ test('outline, mesh and particles of a message have the same channels', () => {
   assert.deepEqual(numbers(frame.particleAttributes?.get('velocity')), [3, 3]);
   assert.deepEqual(numbers(frame.particleAttributes?.get('velocity z')), [2, -3]);
   assert.deepEqual(numbers(frame.particleAttributes?.get('type')), [1, 2]);
+});
+
+test('particles of a stream with own sizes have diameters', () => {
+  const message = create(ReconstructedFrameSchema, {
+    particleFormat: PositionFormat.FLOAT64_2,
+    particles: bytesOf(new Float64Array(4)),
+    particleVolumes: bytesOf(Float32Array.of(4, 9)),
+  });
+  const sizesOf = (sizes: Sizes, boundary: Boundary) => decodeFrame(message, 0, { sizes, boundary }).particleSizes;
+  assert.deepEqual(sizesOf(Sizes.OWN, Boundary.UNSPECIFIED), { diameters: Float32Array.of(2, 3), areDiscs: false });
+  assert.equal(sizesOf(Sizes.OWN, Boundary.GRAINS)?.areDiscs, true);
+  assert.equal(sizesOf(Sizes.EQUAL, Boundary.UNSPECIFIED), null);
+  assert.equal(decodeFrame(message, 0).particleSizes, null);
 });
 
 test('particles of a file have their scalars and velocity', () => {

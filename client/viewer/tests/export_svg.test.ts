@@ -155,6 +155,20 @@ test('particles have the colours of an attribute', () => {
   assert.ok(grey.includes(rampStops({ dark: false, map: 'grey' })[0]) && !grey.includes(stops[0]));
 });
 
+test('particles with own sizes have their diameters, grains all of it', () => {
+  const particles = FRAME.particles!;
+  const diameters = Float32Array.from({ length: particles.length / 2 }, (_, k) => 1 + k % 2);
+  const widths = (areDiscs: boolean) => {
+    const text = draw({ particles: true }, { ...FRAME, particleSizes: { diameters, areDiscs } });
+    assert.equal(count(text, /h0/g), particles.length / 2);
+    return [...text.matchAll(/stroke-width="([\d.]+)"/g)].map(([, width]) => Number(width)).sort((a, b) => a - b);
+  };
+  const [small, large] = widths(true);
+  assert.ok(Math.abs(large / small - 2) < 0.05);
+  assert.ok(Math.abs(small - VIEW.scale) < 0.1, 'a diameter of 1');
+  assert.ok(Math.abs(widths(false)[0] / small - 0.4) < 0.05);
+});
+
 test('caption, scale and legend are on the picture', () => {
   const legend = { name: 'velocity, magnitude', min: 0.5, max: 2, stops: rampStops(DEFAULT_LOOK) };
   const marks = marksOf('dam <1>, frame 12, time 0.5', SIZE, VIEW, legend, false);

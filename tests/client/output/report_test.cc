@@ -87,7 +87,8 @@ class Reader {
 struct Decoded {
   double step = 0;
   std::vector<std::uint64_t> ring_sizes, outer_of;
-  std::vector<double> points, mesh_points, particles;
+  std::vector<double> points, mesh_points, particles, particle_sizes;
+  bool are_discs = false;
   std::vector<std::uint8_t> normals;
   std::vector<std::int64_t> triangles, interior;
   std::vector<std::vector<std::uint64_t>> section_sizes;
@@ -134,6 +135,10 @@ Decoded Decode(const std::string& bytes) {
     out.triangles.insert(out.triangles.end(), {a, b, c});
   }
   points(reader.Count(), out.particles);
+  out.are_discs = reader.Count() == 1;
+  for (std::uint64_t count = reader.Count(); count > 0; --count) {
+    out.particle_sizes.push_back(out.step * static_cast<double>(reader.Count()));
+  }
   for (std::uint64_t sections = reader.Count(); sections > 0; --sections) {
     std::uint64_t section_points = 0;
     std::vector<std::uint64_t>& sizes = out.section_sizes.emplace_back();
@@ -404,6 +409,19 @@ TEST(ReportGeometry, ColoursParticlesInTheRangeOfBoth) {
   const AttributeValues other = {.name = "q", .values = {3, 2}};
   const FrameRecord unknown = {.result = result, .particles = particles, .particle_color = &other};
   EXPECT_THAT(DecodeFrame(unknown, 1000, 1000, "p").particle_colors[0], IsEmpty());
+}
+
+TEST(ReportGeometry, ParticlesHaveTheirOwnSizes) {
+  const Result result = SquareWithHoleAndIsland();
+  const std::vector<double> particles = {3.1, 3.2, 0.1, 0.3};
+  const std::vector<float> sizes = {.5, 1.5};
+  const Decoded decoded = DecodeFrame(
+      {.result = result, .particles = particles, .particle_sizes = sizes, .are_discs = true});
+  ExpectNear(decoded.particle_sizes, {1.5, .5}, decoded.step);
+  EXPECT_TRUE(decoded.are_discs);
+  const Decoded equal = DecodeFrame({.result = result, .particles = particles});
+  EXPECT_THAT(equal.particle_sizes, IsEmpty());
+  EXPECT_FALSE(equal.are_discs);
 }
 
 TEST(ReportGeometry, NormalsHave256Directions) {

@@ -49,6 +49,27 @@ TEST(Svg, DrawsParticlesOnRequest) {
   EXPECT_EQ(CountOf(Encode(FrameFormat::kSvg, frame, {.picture_particles = false}), "h0"), 0u);
 }
 
+// The longer side of the picture is 1000 units.
+TEST(Svg, DrawsParticlesByTheirOwnSizes) {
+  const Result result = SquareWithHoleAndIsland();
+  const std::vector<double> particles = {1, 1, 2, 2, 3, 3};
+  const std::vector<float> sizes = {.5, 1.5, .5};
+  FrameRecord frame{.result = result, .particles = particles, .particle_sizes = sizes};
+  const std::string dots = Encode(FrameFormat::kSvg, frame);
+  EXPECT_EQ(CountOf(dots, R"(class="particles")"), 2u);
+  EXPECT_EQ(CountOf(dots, "h0"), 3u);
+  frame.are_discs = true;
+  const std::string discs = Encode(FrameFormat::kSvg, frame);
+  EXPECT_EQ(CountOf(discs, R"(class="grains")"), 2u);
+  // Discs have their diameters, dots a share of them.
+  const auto width_of = [](const std::string& svg, const char* of) {
+    const std::size_t at = svg.rfind(of);
+    return std::stod(svg.substr(svg.find("stroke-width=\"", at) + 14));
+  };
+  const double dot = width_of(dots, "particles\""), disc = width_of(discs, "grains\"");
+  EXPECT_NEAR(dot / disc, .4, .01);
+}
+
 TEST(Svg, AnEmptyFrameIsAPictureToo) {
   const Result result;
   const std::string svg = Encode(FrameFormat::kSvg, {.result = result});

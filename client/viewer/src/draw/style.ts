@@ -30,6 +30,16 @@ export function dotDiameter(spacing: number): number {
   return Math.min(Math.max(DOT_SPACINGS * spacing, SMALLEST_DOT), LARGEST_DOT);
 }
 
+/** Share of the diameter of a particle with an own size that its dot has, and its opacity; `areDiscs`: grains. */
+export function ownDot(areDiscs: boolean): { share: number; alpha: number } {
+  return areDiscs ? { share: 1, alpha: 0.4 } : { share: DOT_SPACINGS, alpha: PARTICLE_ALPHA };
+}
+
+/** Diameter of the dot of a particle with an own size, from `diameter` times `share`, in pixels. */
+export function ownDotDiameter(diameter: number): number {
+  return Math.max(diameter, SMALLEST_DOT);
+}
+
 /** Length of a drawn normal, from the spacing of the particles; both in pixels. */
 export function normalLength(spacing: number): number {
   return Math.min(Math.max(NORMAL_SPACINGS * spacing, SHORTEST_NORMAL), LONGEST_NORMAL);

@@ -6,7 +6,7 @@ import { type Range, rampColour, rangeOf, shareOf } from '../draw/ramp';
 import { fillTones, isolineColour, ringColours } from '../draw/look_colours';
 import {
   BAND_TINT, dotDiameter, EDGE_ALPHA, EDGE_TINT, EDGE_WIDTH, INTERIOR_TINT, ISOLINE_WIDTH,
-  NORMAL_WIDTH, normalLength, normalStride, PARTICLE_ALPHA,
+  NORMAL_WIDTH, normalLength, normalStride, ownDot, ownDotDiameter, PARTICLE_ALPHA,
 } from '../draw/style';
 import type { Size, View } from '../draw/view';
 import { type Frame, type Mesh, NO_RING, type Rings, TRIANGLE_CLASS } from '../protocol/frame';
@@ -39,7 +39,7 @@ export function svg(
   if (look.fill) parts.push(...areas(frame, look, ringColour, range, at));
   if (look.edges && mesh) parts.push(...edges(mesh, rings, look, ringColour, at));
   if (look.particles && frame.particles) {
-    parts.push(...dots(frame, frame.particles, look, range, dotDiameter(statistics.spacing * view.scale), at));
+    parts.push(...dots(frame, frame.particles, look, range, view.scale, at));
   }
   if (look.normals && rings.normals) {
     const count = rings.points.length / 2;
@@ -133,23 +133,43 @@ function outline(
     stroke(path, colour, look.lineWidth, 1));
 }
 
-/** The particles, in one colour or in the colours of an attribute. */
+/** Widths of dots with own sizes are rounded to this, in CSS pixels, so that many share a path. */
+const DOT_STEP = 0.05;
+
+/** The particles, in one colour or in the colours of an attribute, in groups of one diameter. */
 function dots(
-  { particleAttributes }: Frame, particles: Float32Array, look: Look, range: Range | null,
-  diameter: number, at: Projection,
+  { particleAttributes, particleSizes: own, statistics }: Frame, particles: Float32Array, look: Look, range: Range | null,
+  scale: number, at: Projection,
 ): string[] {
   const name = attributeOf(look);
   const values = name === null ? undefined : particleAttributes?.get(name);
-  if (!values) return [line(dotPath(particles, at), theme(look.dark).particle, diameter, PARTICLE_ALPHA)];
-  const extent = range ?? rangeOf(values) ?? { min: 0, max: 1 };
-  const paths = new Map<string, string>();
-  for (let k = 0; k < particles.length / 2; ++k) {
-    const colour = colourAt(extent, values[k], look);
-    paths.set(colour, (paths.get(colour) ?? '') + dotPath(particles.subarray(2 * k, 2 * k + 2), at));
+  const { share, alpha } = own ? ownDot(own.areDiscs) : { share: 0, alpha: PARTICLE_ALPHA };
+  const diameterOf = (k: number) => own
+    ? DOT_STEP * Math.round(ownDotDiameter(share * own.diameters[k] * scale) / DOT_STEP)
+    : dotDiameter(statistics.spacing * scale);
+  const groups = groupBy(particles.length / 2, diameterOf);
+  return Array.from(groups).flatMap(([diameter, members]) => {
+    const path = (chosen: readonly number[]) => chosen.map((k) => dotPath(particles.subarray(2 * k, 2 * k + 2), at)).join('');
+    if (!values) return [line(path(members), theme(look.dark).particle, diameter, alpha)];
+    const extent = range ?? rangeOf(values) ?? { min: 0, max: 1 };
+    const byColour = groupBy(members.length, (k) => colourAt(extent, values[members[k]], look));
+    const rim = line(path(members), theme(look.dark).background, diameter, alpha);
+    const dot = diameter > 4 ? diameter - 1.5 : diameter;
+    return [rim, ...Array.from(byColour, ([colour, chosen]) =>
+      stroke(path(chosen.map((k) => members[k])), colour, dot, alpha))];
+  });
+}
+
+/** The numbers below `count`, by a key. */
+function groupBy<Key>(count: number, keyOf: (k: number) => Key): Map<Key, number[]> {
+  const groups = new Map<Key, number[]>();
+  for (let k = 0; k < count; ++k) {
+    const key = keyOf(k);
+    const group = groups.get(key);
+    if (group) group.push(k);
+    else groups.set(key, [k]);
   }
-  const rim = line(dotPath(particles, at), theme(look.dark).background, diameter, PARTICLE_ALPHA);
-  const dot = diameter > 4 ? diameter - 1.5 : diameter;
-  return [rim, ...Array.from(paths, ([colour, path]) => stroke(path, colour, dot, PARTICLE_ALPHA))];
+  return groups;
 }
 
 /** Colour of a number, in steps. */

@@ -1,12 +1,12 @@
 import {
   CoordinateFormat, type Mesh as MeshMessage, Output, Plane, type ReconstructedFrame,
-  type Rings as RingsMessage,
+  type ReconstructionParameters, type Rings as RingsMessage,
 } from '@proto/v1/reconstruction_pb';
 import { arrayOf, bytesOf } from './arrays';
 import { AttributeChannels, type Channels } from './channels';
 import { checkNesting, countCheck, lost, offsetsOf } from './checks';
 import { bareRings, type Frame, type Mesh, type Rings, type Statistics } from './frame';
-import { type Particles, particleChannels } from './particles';
+import { type Particles, particleChannels, particleSizes, type SizeParameters } from './particles';
 import { relativePositions } from './positions';
 import { surfaceMessageOf } from './surface';
 
@@ -161,6 +161,9 @@ function decodeSection(section: ReconstructedFrame, { sequence, time }: Reconstr
   return decodeFrame({ ...section, sequence, time }, Plane.UNSPECIFIED);
 }
 
+/** The parameters that decide how a result is decoded. */
+export type ResultParameters = SizeParameters & Pick<ReconstructionParameters, 'output' | 'plane'>;
+
 /** The input particles that the server returned in a result, as they were sent. */
 export function echoedParticles(message: ReconstructedFrame): Particles {
   return {
@@ -178,8 +181,11 @@ function echoedChannels(message: ReconstructedFrame): Channels | null {
   return [...channels.keys()].length > 0 ? channels : null;
 }
 
-/** Decodes a result. `plane`: the coordinate plane onto which returned input particles with x, y, z are projected. */
-export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
+/**
+ * Decodes a result. `plane`: the coordinate plane onto which returned input particles with x, y, z are projected. `sizes`:
+ * of the stream; null for equal sizes.
+ */
+export function decodeFrame(message: ReconstructedFrame, plane: Plane, sizes: SizeParameters | null = null): Frame {
   const relative = new Relative(message);
   return {
     sequence: message.sequence,
@@ -191,6 +197,7 @@ export function decodeFrame(message: ReconstructedFrame, plane: Plane): Frame {
     particles: message.particles.length > 0
       ? relativePositions(message.particleFormat, message.particles, plane, relative.origin)
       : null,
+    particleSizes: particleSizes(echoedParticles(message), sizes),
     particleAttributes: echoedChannels(message),
     statistics: decodeStatistics(message),
     ringsDigest: message.ringsDigest,
@@ -217,7 +224,8 @@ export function decodeSpaceFrame(message: ReconstructedFrame): Frame {
   };
 }
 
-/** Decodes a result of a stream with this output. `plane`: as of `decodeFrame`. */
-export function decodeResult(message: ReconstructedFrame, output: Output | undefined, plane: Plane): Frame {
-  return output === Output.SURFACE ? decodeSpaceFrame(message) : decodeFrame(message, plane);
+/** Decodes a result of a stream with these parameters; null: they are not known. */
+export function decodeResult(message: ReconstructedFrame, parameters: ResultParameters | null): Frame {
+  return parameters?.output === Output.SURFACE
+    ? decodeSpaceFrame(message) : decodeFrame(message, parameters?.plane ?? Plane.UNSPECIFIED, parameters);
 }

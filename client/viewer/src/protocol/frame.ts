@@ -63,6 +63,14 @@ export interface Statistics {
   doubts: number[];
 }
 
+/** The particles' own sizes. */
+export interface ParticleSizes {
+  /** By particle, in world units. */
+  diameters: Float32Array;
+  /** Particles are discs of these diameters (grains). Otherwise a diameter is the spacing that fits the particle. */
+  areDiscs: boolean;
+}
+
 /** One result, ready to draw. Arrays are views into the message if its alignment allows. */
 export interface Frame {
   sequence: bigint;
@@ -77,6 +85,8 @@ export interface Frame {
   mesh: Mesh | null;
   /** x, y of every particle, relative to the origin. */
   particles: Float32Array | null;
+  /** Absent: all particles have the spacing of the frame. */
+  particleSizes?: ParticleSizes | null;
   /** Numbers per particle; null if none are known. */
   particleAttributes: Channels | null;
   statistics: Statistics;

@@ -68,6 +68,7 @@ export function pictureOf(frame: Frame, outlines: readonly Outline[], shown: num
   return {
     ...all[base], sections, isolines,
     particles: isOwnPlane ? moved(frame.particles, frame.origin, all[base].origin) : null,
+    particleSizes: isOwnPlane ? frame.particleSizes : null,
     particleAttributes: isOwnPlane ? frame.particleAttributes : null,
   };
 }

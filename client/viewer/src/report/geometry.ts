@@ -1,6 +1,6 @@
 import { bytesOf } from '../protocol/arrays';
 import { channelsOf, type Channels } from '../protocol/channels';
-import { bareRings, type Mesh, NO_RING, type Rings } from '../protocol/frame';
+import { bareRings, type Mesh, NO_RING, type ParticleSizes, type Rings } from '../protocol/frame';
 import { bytesOfBase64, Reader } from './reader';
 
 /** Geometry of a frame in a report. The format is described in client/output/report_geometry.h. */
@@ -11,6 +11,7 @@ export interface Geometry {
   sections: Rings[];
   mesh: Mesh | null;
   particles: Float32Array;
+  particleSizes: ParticleSizes | null;
   particleAttributes: Channels;
 }
 
@@ -23,6 +24,7 @@ export function decodeGeometry(base64: string, colors: Colors | null): Geometry 
   const rings = decodeRings(reader);
   const mesh = decodeMesh(reader, rings.points);
   const particles = reader.points(reader.count());
+  const particleSizes = decodeParticleSizes(reader);
   const sections = Array.from({ length: reader.count() }, () => decodeSection(reader));
   const attributes = new Map<string, Float32Array>();
   const particleAttributes = new Map<string, Float32Array>();
@@ -36,7 +38,7 @@ export function decodeGeometry(base64: string, colors: Colors | null): Geometry 
     if (mesh && values.length === mesh.points.length / 2) mesh.attributes.set(channels[channel], values);
     if (ofParticles.length > 0) particleAttributes.set(channels[channel], ofParticles);
   }
-  return { origin, rings: { ...rings, attributes }, sections, mesh, particles, particleAttributes };
+  return { origin, rings: { ...rings, attributes }, sections, mesh, particles, particleSizes, particleAttributes };
 }
 
 /** Converts bytes to numbers: 0 is the lower end of the range, 255 the upper. */
@@ -101,6 +103,12 @@ function decodeMesh(reader: Reader, ringPoints: Float32Array): ReportMesh | null
     triangles[3 * k + 2] = a + reader.signed();
   }
   return count > 0 ? new ReportMesh(points, triangles, classes) : null;
+}
+
+function decodeParticleSizes(reader: Reader): ParticleSizes | null {
+  const areDiscs = reader.count() === 1;
+  const diameters = Float32Array.from({ length: reader.count() }, () => reader.length());
+  return diameters.length > 0 ? { diameters, areDiscs } : null;
 }
 
 function decodeSection(reader: Reader): Rings {

@@ -44,6 +44,11 @@ export class Reader {
     return points;
   }
 
+  /** A length in world units. */
+  length(): number {
+    return this.step * this.count();
+  }
+
   byteArray(): Uint8Array {
     const count = this.count();
     this.next += count;

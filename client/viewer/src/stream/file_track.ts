@@ -1,4 +1,4 @@
-import { Output, type ReconstructedFrame, type ReconstructionParameters, type StreamOpened }
+import { Plane, type ReconstructedFrame, type ReconstructionParameters, type StreamOpened }
   from '@proto/v1/reconstruction_pb';
 import { InputError, type FrameSource } from '../input/source';
 import { shareOf } from '../input/share';
@@ -10,8 +10,9 @@ import { Player, type Range } from './player';
 import { Producer, parseResult } from './producer';
 import { type Outline, outlinesOf } from '../protocol/sections';
 import { methodOf, outputsFor, parametersOf, type Settings, withSource } from './settings';
-import { decodeResult } from '../protocol/decode';
-import { particleChannels, type Particles } from '../protocol/particles';
+import { decodeFrame, decodeSpaceFrame } from '../protocol/decode';
+import type { Frame } from '../protocol/frame';
+import { particleChannels, type Particles, particleSizes } from '../protocol/particles';
 import { relativePositions } from '../protocol/positions';
 import { CallError, describe, mayRetry, sentence, type CallStatus } from './status';
 import { summarise, type Counts } from './summary';
@@ -80,6 +81,7 @@ export class FileTrack implements Track {
     if (plane) particles = nearPlane(particles, plane, (this.source.spacing ?? 0) / 2);
     return {
       points: relativePositions(particles.positionFormat, particles.positions, 0, origin),
+      sizes: particleSizes(particles, this.parameters),
       attributes: particleChannels(particles),
     };
   }
@@ -117,6 +119,11 @@ export class FileTrack implements Track {
         if (!(error instanceof CallError)) throw error;
         if (attempt === this.attempt) this.ended(error.status);
       });
+  }
+
+  private decode(message: Uint8Array): Frame {
+    const result = parseResult(message);
+    return this.source.isSurface ? decodeSpaceFrame(result) : decodeFrame(result, Plane.UNSPECIFIED);
   }
 
   private open(): void {
@@ -173,7 +180,7 @@ export class FileTrack implements Track {
       bytes: message.length,
       summary: summarise(frame, this.counts),
       frame: () => ({
-        ...decodeResult(parseResult(message), this.source.isSurface ? Output.SURFACE : undefined, 0), sequence: BigInt(sequence),
+        ...this.decode(message), sequence: BigInt(sequence),
       }),
     }, Math.max(1, (this.player.sequence ?? 1) - KEPT_BEHIND));
     this.answered(sequence);

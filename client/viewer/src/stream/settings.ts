@@ -215,6 +215,7 @@ export function parametersOf(settings: Settings, base: ReconstructionParameters 
     // Other placements cannot be cut at walls.
     walls: canHaveWalls ? walls : undefined,
     wallPhases: canHaveWalls ? base?.wallPhases : undefined,
+    wallPlanes: base?.wallPlanes,
     phaseAttribute: base?.phaseAttribute,
     // Farthest-particle cannot be wrapped.
     box: base?.box && { ...base.box, wraps: base.box.wraps && !farthest },

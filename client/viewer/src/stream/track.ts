@@ -3,6 +3,7 @@ import type { Bounds } from '../draw/view';
 import type { Entry, History } from './history';
 import type { Playable, Player } from './player';
 import type { Channels } from '../protocol/channels';
+import type { ParticleSizes } from '../protocol/frame';
 import type { Particles } from '../protocol/particles';
 import type { Outline } from '../protocol/sections';
 import type { Settings } from './settings';
@@ -31,8 +32,8 @@ export interface TrackState {
 /** Names of placement and fill. */
 export interface Method { placement: string; fill: string }
 
-/** Particles to draw: x, y of each, and their numbers. */
-export interface DrawnParticles { points: Float32Array; attributes: Channels }
+/** Particles to draw: x, y of each, their own sizes, and their numbers. */
+export interface DrawnParticles { points: Float32Array; sizes: ParticleSizes | null; attributes: Channels }
 
 /** The frames of curves: of a track, or of a variant of it. */
 export type CurveSource = Pick<Track, 'history' | 'player' | 'labelOf' | 'sequenceOf'>;

@@ -2,7 +2,7 @@ import { Output, ReconstructFrameRequestSchema, ReconstructFrameResponseSchema }
 import { shareOf } from '../input/share';
 import { decodeResult } from '../protocol/decode';
 import type { Frame } from '../protocol/frame';
-import { particleChannels } from '../protocol/particles';
+import { particleChannels, particleSizes } from '../protocol/particles';
 import type { Gateway } from './gateway';
 import { NO_FRAME_BOXES } from './producer';
 import { outputsFor, parametersOf, settingsText, type Settings } from './settings';
@@ -61,9 +61,10 @@ export class Variant {
     }
     const chosen = shareOf(particles, settings.share);
     const spacing = track.entryAt(sequence)?.frame().statistics.spacing ?? null;
+    const parameters = parametersOf(settings, track.parameters, spacing);
     const response = await this.gateway.call(
       '/v1/frame', ReconstructFrameRequestSchema, ReconstructFrameResponseSchema, {
-        parameters: parametersOf(settings, track.parameters, spacing),
+        parameters,
         outputs: outputsFor((particles.scalars ?? []).map(({ name }) => name), track.parameters?.output === Output.SURFACE),
         frame: chosen,
       });
@@ -73,7 +74,8 @@ export class Variant {
     frame.particleFormat = chosen.positionFormat;
     frame.particles = chosen.positions;
     return {
-      ...decodeResult(frame, track.parameters?.output, track.parameters?.plane ?? 0), particleAttributes: particleChannels(chosen),
+      ...decodeResult(frame, track.parameters),
+      particleSizes: particleSizes(chosen, parameters), particleAttributes: particleChannels(chosen),
     };
   }
 }

@@ -3,7 +3,7 @@ import { ReconstructionParametersSchema, type ReconstructedFrame } from '@proto/
 import { InputError } from '../input/source';
 import { shareOf } from '../input/share';
 import { decodeFrame } from '../protocol/decode';
-import { particleChannels, type Particles } from '../protocol/particles';
+import { particleChannels, type Particles, particleSizes } from '../protocol/particles';
 import { relativePositions } from '../protocol/positions';
 import { Backoff } from './backoff';
 import type { Gateway } from './gateway';
@@ -148,7 +148,7 @@ export class VariantStream implements CurveSource {
       const attributes = capabilities.includes('attributes') ? (particles.scalars ?? []).map(({ name }) => name) : [];
       const spacing = this.track.entryAt(first)?.frame().statistics.spacing ?? null;
       const producer: Producer = new Producer(this.gateway, {
-        parameters: parametersOf(this.settings, this.track.parameters, spacing),
+        parameters: this.parameters(spacing),
         outputs: outputsFor(attributes),
         labels: { from: 'viewer', role: 'variant' },
       }, {
@@ -221,6 +221,10 @@ export class VariantStream implements CurveSource {
     }, Math.max(1, this.target - KEPT_BEHIND));
   }
 
+  private parameters(spacing: number | null = null) {
+    return parametersOf(this.settings, this.track.parameters, spacing);
+  }
+
   /** The particles used, relative to `origin`: the server does not return them. */
   async drawnParticles(sequence: number, origin: [number, number]) {
     const particles = await this.track.particlesOf(sequence);
@@ -228,6 +232,7 @@ export class VariantStream implements CurveSource {
     const used = shareOf(particles, this.settings.share);
     return {
       points: relativePositions(used.positionFormat, used.positions, this.track.parameters?.plane ?? 0, origin),
+      sizes: particleSizes(used, this.parameters()),
       attributes: particleChannels(used),
     };
   }

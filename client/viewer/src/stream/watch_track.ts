@@ -250,7 +250,7 @@ export class WatchTrack implements Track {
       bytes: message.length,
       summary: summarise(frame, live ? this.counts : null),
       message: parse,
-      frame: () => decodeResult(parse(), this.parameters?.output, this.parameters?.plane ?? 0),
+      frame: () => decodeResult(parse(), this.parameters),
     }, keepFrom);
     if (isKept && live) this.parsed = { message, frame };
     return isKept;

@@ -462,6 +462,7 @@ export class Pane {
     const particles = await source.drawnParticles(Number(frame.sequence), frame.origin);
     if (frame !== this.frame || !particles) return;
     frame.particles = particles.points;
+    frame.particleSizes = particles.sizes;
     frame.particleAttributes = particles.attributes;
     this.scene.show(frame);
     this.dirty = true;

@@ -222,6 +222,25 @@ test('an attribute colours particles, in the map and range of the look', () =>
     assertNear(colours[3], ground, 2, 'no particle');
   }));
 
+test('particles with own sizes are as large as they are', () =>
+  inPage(async (page) => {
+    const { grains, dots, ground } = await page.evaluate(() => {
+      const frame = bench.polygon([[0, 0], [10, 0], [10, 6], [0, 6]]);
+      frame.particles = Float32Array.of(2, 3, 7, 3);
+      const look = { fill: false, outline: false, particles: true };
+      const places = [[2, 3], [2.4, 3], [2.7, 3], [7, 3], [8.2, 3], [8.7, 3]];
+      const diameters = Float32Array.of(1, 3);
+      const drawn = (areDiscs) => {
+        bench.picture(look, { ...frame, particleSizes: { diameters, areDiscs } });
+        return bench.coloursAt(places);
+      };
+      return { grains: drawn(true), dots: drawn(false), ground: bench.theme(false).background.map((part) => 255 * part) };
+    });
+    const isDrawn = (colours) => colours.map((colour) => Math.max(...colour.map((part, k) => Math.abs(part - ground[k]))) > 20);
+    assert.deepEqual(isDrawn(grains), [true, true, false, true, true, false], 'discs of the diameters 1 and 3');
+    assert.deepEqual(isDrawn(dots), [true, false, false, true, false, false], 'dots of .4 times the diameters');
+  }));
+
 test('isolines have their colours and their own origin', () =>
   inPage(async (page) => {
     const { colours, background } = await page.evaluate(() => {

@@ -78,6 +78,8 @@ export class FrameTextures {
   /** A number per vertex of the rings, or per point of the mesh if `isMeshColoured`. */
   readonly attribute: DataTexture;
   readonly particles: DataTexture;
+  /** A diameter per particle, for frames with own sizes. */
+  readonly particleSizes: DataTexture;
   /** A number per particle if `hasParticleColours`. */
   readonly particleNumbers: DataTexture;
   hasParticleColours = false;
@@ -99,6 +101,7 @@ export class FrameTextures {
     this.normals = new DataTexture(gl, TEXELS.float2);
     this.attribute = new DataTexture(gl, TEXELS.float);
     this.particles = new DataTexture(gl, TEXELS.float2);
+    this.particleSizes = new DataTexture(gl, TEXELS.float);
     this.particleNumbers = new DataTexture(gl, TEXELS.float);
     this.ramp = new RampTexture(gl);
   }
@@ -117,7 +120,7 @@ export class FrameTextures {
     this.prepareRings(frame, look, colours, isMeshed);
     if (isMeshed) this.prepareMesh(frame, look, colours);
     this.prepareAttribute(frame, look);
-    const { rings, particles } = frame;
+    const { rings, particles, particleSizes } = frame;
     shownIsolines(frame, look).forEach((isoline, k) => {
       this.isolines[k] ??= new RingTextures(this.gl);
       this.once(`isolines ${k}`, isoline.index, () => {
@@ -132,6 +135,7 @@ export class FrameTextures {
     }
     if (look.particles && particles) {
       this.once('particles', true, () => this.particles.upload(particles));
+      if (particleSizes) this.once('particleSizes', true, () => this.particleSizes.upload(particleSizes.diameters));
       this.prepareParticleNumbers(frame, look);
     }
     this.ramp.upload(look);
@@ -140,7 +144,7 @@ export class FrameTextures {
   destroy(): void {
     for (const texture of [
       this.outline, ...this.isolines, this.triangles, this.classes, this.tints, this.normals,
-      this.attribute, this.particles, this.particleNumbers, this.ramp,
+      this.attribute, this.particles, this.particleSizes, this.particleNumbers, this.ramp,
     ]) {
       texture.destroy();
     }

@@ -1,24 +1,28 @@
 import { theme } from '../colours';
 import type { FrameTextures } from './frame_textures';
 import { type AttributeStyle, type Camera, Programs } from './program';
-import { PARTICLE_ALPHA } from '../style';
+import { ownDot, ownDotDiameter, PARTICLE_ALPHA } from '../style';
 
 const VERTEX = `
 uniform sampler2D particles;
-uniform float diameter;  // Device pixels.
+uniform sampler2D sizes;  // Own diameters, world units.
+uniform vec2 dot;         // Device pixels per world unit of an own diameter, and the least diameter of a dot.
+uniform float common;     // Diameter without own ones, device pixels.
 uniform sampler2D numbers;
-uniform vec2 range;      // Smallest number, and 1 / (largest - smallest).
+uniform vec2 range;       // Smallest number, and 1 / (largest - smallest).
 flat out float value;
+flat out float diameter;
 
 void main() {
   value = byAttribute ? (texelFetch(numbers, at(gl_VertexID), 0).r - range.x) * range.y : 0.0;
   gl_Position = position(pixel(texelFetch(particles, at(gl_VertexID), 0).rg));
+  diameter = bySize ? max(texelFetch(sizes, at(gl_VertexID), 0).r * dot.x, dot.y) : common;
   gl_PointSize = diameter + 2.0;
 }
 `;
 
 const FRAGMENT = `
-uniform float diameter;
+flat in float diameter;
 uniform vec4 ink;
 uniform vec4 ground;   // Rim of a dot that has the colour of its surroundings.
 flat in float value;
@@ -36,6 +40,13 @@ void main() {
 }
 `;
 
+/** How large dots are: of one diameter in device pixels, or by own diameters (`FrameTextures.particleSizes`). */
+export interface DotSizes {
+  diameter: number;
+  /** Null: all have `diameter`. */
+  own: { areDiscs: boolean; ratio: number } | null;
+}
+
 /** Draws particles as round dots, in one colour or in the colours of an attribute. */
 export class ParticlePass {
   private readonly programs: Programs;
@@ -44,19 +55,25 @@ export class ParticlePass {
     this.programs = new Programs(gl, VERTEX, FRAGMENT);
   }
 
-  /** `diameter` in device pixels. */
+  /** `sizes.own.ratio`: device pixels per CSS pixel. */
   draw(
-    textures: FrameTextures, camera: Camera, count: number, diameter: number, dark: boolean,
+    textures: FrameTextures, camera: Camera, count: number, sizes: DotSizes, dark: boolean,
     attribute: AttributeStyle | null,
   ): void {
     const style = textures.hasParticleColours ? attribute : null;
-    const program = this.programs.for({ byAttribute: style !== null });
+    const { own } = sizes;
+    const { share, alpha } = own ? ownDot(own.areDiscs) : { share: 0, alpha: PARTICLE_ALPHA };
+    const program = this.programs.for({ byAttribute: style !== null, bySize: own !== null });
     program.use(camera);
     program.texture('particles', textures.particles);
     program.attribute(style, textures.particleNumbers, textures.ramp);
-    program.number('diameter', diameter);
+    program.number('common', sizes.diameter);
+    if (own) {
+      program.texture('sizes', textures.particleSizes);
+      program.vector2('dot', [share * camera.scale, own.ratio * ownDotDiameter(0)]);
+    }
     program.colour('ground', theme(dark).background);
-    program.colour('ink', theme(dark).particle, PARTICLE_ALPHA);
+    program.colour('ink', theme(dark).particle, alpha);
     this.gl.drawArrays(this.gl.POINTS, 0, count);
   }
 

@@ -91,8 +91,9 @@ export class Renderer implements Drawing {
     }
     if (look.particles && frame.particles) {
       const diameter = ratio * dotDiameter(frame.statistics.spacing * view.scale);
+      const own = frame.particleSizes ? { areDiscs: frame.particleSizes.areDiscs, ratio } : null;
       this.particles.draw(
-        this.textures, camera, frame.particles.length / 2, diameter, look.dark, attribute);
+        this.textures, camera, frame.particles.length / 2, { diameter, own }, look.dark, attribute);
     }
     if (look.normals && frame.rings.normals) this.drawNormals(picture, frame, camera);
     if (look.outline) this.drawOutline(picture, attribute, camera);
