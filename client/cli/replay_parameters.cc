@@ -117,6 +117,10 @@ absl::Status AddPhases(const ReplayFlags& flags, ReconstructionParameters& param
 
 // Parses each --wall-plane. The core's Validate checks them against each other.
 absl::Status AddWallPlanes(const ReplayFlags& flags, ReconstructionParameters& parameters) {
+  if (!flags.wall_planes.empty() && !flags.surface) {
+    return WrongFlag("--wall-plane", flags.wall_planes.front(),
+                     "used with --surface; outlines have --wall X0,Y0,X1,Y1");
+  }
   constexpr std::string_view kAxes = "xyz", kBelow = ",below", kAbove = ",above";
   for (const std::string& text : flags.wall_planes) {
     std::string_view rest = text;
@@ -139,6 +143,12 @@ absl::Status AddWallPlanes(const ReplayFlags& flags, ReconstructionParameters& p
 // Parses each --wall. The core's Validate checks the shape of the walls.
 absl::Status AddWalls(const ReplayFlags& flags, ReconstructionParameters& parameters) {
   for (const std::string& text : flags.walls) {
+    if (text.starts_with("x=") || text.starts_with("y=") || text.starts_with("z=")) {
+      return WrongFlag(
+          "--wall", text,
+          "two points of the line, with the fluid on its left, such as 0,0,1,0 for the "
+          "floor y = 0; a surface has --wall-plane z=0");
+    }
     if (text.find('=') != std::string::npos) {
       const std::string attribute = parameters.phase_attribute;
       const bool is_other = !parameters.wall_phases.empty() && AttributeOf(text) != attribute;

@@ -46,6 +46,10 @@ struct FrameRecord {
   /// if there is none.
   const AttributeValues* particle_color = nullptr;
   std::size_t section = 0;  ///< Number of the section, from 1; 0: the frame itself.
+
+  bool HasParticleSizes() const {
+    return !particles.empty() && particle_sizes.size() == particles.size() / 2;
+  }
 };
 
 /// Numbers of a surface, over all of its shells.

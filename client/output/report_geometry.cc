@@ -149,10 +149,9 @@ void EncodeParticles(std::span<const double> particles, std::span<const std::siz
 }
 
 void EncodeSizes(const FrameRecord& frame, std::span<const std::size_t> shown, Encoder& encoder) {
-  const bool has_sizes = frame.particle_sizes.size() == frame.particles.size() / 2;
   encoder.Count(frame.are_discs ? 1 : 0);
-  encoder.Count(has_sizes ? shown.size() : 0);
-  if (!has_sizes) return;
+  encoder.Count(frame.HasParticleSizes() ? shown.size() : 0);
+  if (!frame.HasParticleSizes()) return;
   for (const std::size_t particle : shown) encoder.Length(double{frame.particle_sizes[particle]});
 }
 

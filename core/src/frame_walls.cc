@@ -1,11 +1,20 @@
 #include "frame_walls.h"
 
+#include <charconv>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
+#include "absl/functional/function_ref.h"
+#include "absl/strings/str_cat.h"
 #include "bins/bins.h"
 #include "bins/resolution.h"
+#include "frame/frame_view.h"
 #include "frame/in_stage.h"
 #include "frame/scale.h"
+#include "frame/wall_rules.h"
 #include "frame_lengths.h"
 #include "partiemc/status.h"
 #include "walls/wall_copies.h"
@@ -19,6 +28,22 @@ namespace {
 constexpr double kWallMargin = 6;
 // Images of obstacles have no ends.
 constexpr double kObstacleMargin = 2;
+
+// Replaces the number of a particle in an error about its position by name(number). `count`: of
+// particles that have a name. Other errors stay.
+absl::Status WithNumber(const absl::Status& status, std::size_t count,
+                        absl::FunctionRef<std::uint32_t(std::uint32_t)> name) {
+  const std::string prefix = "positions[";
+  std::optional<Violation> violation = FindViolation(status);
+  if (!violation || !violation->field.starts_with(prefix)) return status;
+  const std::size_t end = violation->field.find(']');
+  std::uint32_t number = 0;
+  const auto digits = std::string_view(violation->field).substr(prefix.size(), end);
+  const auto read = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (read.ec != std::errc() || number >= count) return status;
+  violation->field = absl::StrCat(prefix, name(number), violation->field.substr(end));
+  return ViolationError(status.code(), *std::move(violation));
+}
 
 // The outline of wall particles, with sharp corners: b.wall_result.
 absl::Status OutlineWalls(const FrameWallsInput& input, const Frame& particles, FrameMemory& memory,
@@ -43,21 +68,31 @@ absl::Status OutlineWalls(const FrameWallsInput& input, const Frame& particles, 
 absl::Status FindImages(const FrameWallsInput& input, FrameMemory& memory, Workspace::Buffers& b,
                         FrameWalls& walls) {
   const ReconstructionParameters& parameters = input.parameters;
+  absl::Status status =
+      CheckWallsInBox(parameters.walls, *input.fluid.box, AxesOf(input.fluid, parameters.plane));
   // Without lengths there is no outline.
-  const double radius =
-      parameters.kernel_radius * (input.prepared.lengths ? input.prepared.lengths->spacing : 0);
-  const auto range = [&](double radii) {
-    return RangeAround(input.fluid, parameters.plane, radii * radius);
+  if (!status.ok() || !input.prepared.lengths) return status;
+  const double radius = parameters.kernel_radius * input.prepared.lengths->spacing;
+  const auto reserve = [&](std::uint64_t bytes) {
+    absl::Status reserved = memory.ReserveParticles(bytes, "images of walls");
+    memory.Done();
+    return reserved;
   };
-  absl::Status status = b.wall_copies.TakeObstacles(parameters.walls, range(kObstacleMargin));
+  status = InStage(input.observer, Stage::kBins, [&] {
+    const WallRange range = RangeOf(input.fluid, parameters.plane);
+    absl::Status taken = b.wall_copies.TakeObstacles(
+        parameters.walls, Widened(range, kObstacleMargin * radius), reserve);
+    if (!taken.ok() || input.of_walls == nullptr) return taken;
+    return b.wall_copies.TakeParticles(
+        {b.wall_particles.walls(), parameters.plane, b.wall_particles.wall_sources()},
+        Widened(range, kWallMargin * radius), reserve);
+  });
   walls.fixed = b.wall_copies.walls();
+  walls.are_obstacles = true;
   if (!status.ok() || input.of_walls == nullptr) return status;
-  status = b.wall_copies.TakeParticles(
-      b.wall_particles.walls(), parameters.plane, range(kWallMargin), [&](std::uint64_t bytes) {
-        return memory.ReserveParticles(bytes, "images of wall particles");
-      });
-  memory.Done();
-  return status.ok() ? OutlineWalls(input, b.wall_copies.particles(), memory, b) : status;
+  const auto names = b.wall_copies.names();
+  return WithNumber(OutlineWalls(input, b.wall_copies.particles(), memory, b), names.size(),
+                    [&](std::uint32_t copy) { return names[copy]; });
 }
 
 }  // namespace
@@ -103,6 +138,7 @@ absl::Status TakeWallParticles(const Frame& given, const ReconstructionParameter
 absl::Status FindFrameWalls(const FrameWallsInput& input, FrameMemory& memory,
                             Workspace::Buffers& b, FrameWalls& walls) {
   walls.fixed = input.parameters.walls;
+  b.wall_result.Clear();
   absl::Status status;
   if (input.parameters.box) {
     status = FindImages(input, memory, b, walls);
@@ -111,6 +147,14 @@ absl::Status FindFrameWalls(const FrameWallsInput& input, FrameMemory& memory,
   }
   if (input.of_walls != nullptr) walls.of_particles = &b.wall_result.rings;
   return status;
+}
+
+absl::Status NamingGivenParticle(const absl::Status& status, const Prepared& prepared,
+                                 std::span<const std::uint32_t> fluid_sources) {
+  const LiftedFrame& lifted = prepared.lifted;
+  return WithNumber(status, lifted.frame.ParticleCount(), [&](std::uint32_t particle) {
+    return fluid_sources[lifted.OriginalOf(particle)];
+  });
 }
 
 }  // namespace partiemc

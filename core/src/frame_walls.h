@@ -2,7 +2,7 @@
 // both in a periodic box.
 #pragma once
 
-#include <memory>
+#include <cstdint>
 #include <span>
 
 #include "absl/status/status.h"
@@ -46,5 +46,10 @@ struct FrameWallsInput {
 /// Errors: see Reconstructor::Reconstruct. Cost: the outline of the wall particles.
 absl::Status FindFrameWalls(const FrameWallsInput& input, FrameMemory& memory,
                             Workspace::Buffers& buffers, FrameWalls& walls);
+
+/// Replaces the number of a particle of the fluid, lifted and copied, by the caller's number in an
+/// error about its position. Other errors stay.
+absl::Status NamingGivenParticle(const absl::Status& status, const Prepared& prepared,
+                                 std::span<const std::uint32_t> fluid_sources);
 
 }  // namespace partiemc

@@ -125,7 +125,8 @@ absl::Status FindWalls(const OutlineTask& task, const Scale& scale, FrameSize& s
                        FrameMemory& memory, Workspace::Buffers& b) {
   const TileDirectory& directory = b.bins.tiles;
   InStage(task.observer, Stage::kField, [&] {
-    b.walls.ListLines(task.walls.fixed, task.walls.of_particles, scale.cell_size, directory);
+    b.walls.ListLines({task.walls.fixed, task.walls.of_particles, task.walls.are_obstacles},
+                      scale.cell_size, directory);
   });
   size.wall_pairs = b.walls.PairCount();
   size.wall_lines = b.walls.lines().edges().size();

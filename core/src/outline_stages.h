@@ -20,6 +20,7 @@ namespace partiemc {
 /// The walls of a frame (frame_walls.h).
 struct FrameWalls {
   std::span<const Wall> fixed = {};
+  bool are_obstacles = false;  ///< Polygons of `fixed` are obstacles, however they are oriented.
   const Rings* of_particles = nullptr;  ///< Outlines of wall particles; null: none.
 
   bool Any() const {

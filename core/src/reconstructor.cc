@@ -260,6 +260,9 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
     return outlined;
   };
   if (!is_surface) status = reconstruct(parameters_, state, 0, result);
+  if (has_wall_particles) {
+    status = NamingGivenParticle(status, prepared, b.wall_particles.fluid_sources());
+  }
   // Phases first: they read buffers of the outline that other sections overwrite.
   PhaseLabel label = kNoPhase;
   for (const bool is_phase : {true, false}) {

@@ -63,10 +63,11 @@ bool CutAtBox(const SurfaceParameters& parameters, double inner_step, const Copi
                                          .spacing = parameters.spacing,
                                          .inner_step = inner_step},
                                         scratch.cut, scratch.pieces, surface);
+  if (!is_cut) return false;
   for (const std::uint32_t source : scratch.pieces.sources) {
     scratch.is_done.push_back(shells.is_cut[source]);
   }
-  return is_cut;
+  return true;
 }
 
 bool CutAtWalls(const SurfaceParameters& parameters, double inner_step, PlaneCuts& scratch,

@@ -130,9 +130,19 @@ absl::Status Reserve(const space::SurfaceSize& size, MemoryGuard* guard) {
                     " MiB: reach fewer bricks, or try again later")});
 }
 
+/// The number of particles and copies without a body.
+std::uint64_t CountAlone(const space::SpaceBins& bins, const space::Bodies& bodies) {
+  std::uint64_t alone = 0;
+  for (std::uint32_t p = 0; p < bodies.body_of_particle.size(); ++p) {
+    alone += bodies.body_of_particle[p] == kNoIndex && !bins.IsMirror(p) ? 1 : 0;
+  }
+  return alone;
+}
+
 /// Sets bodies, samples and attribute values of `size`. `particles`: their number without images.
 /// `usual`: the volume of a particle of the spacing.
-void AddBodies(const Frame& frame, std::size_t particles, double usual, const space::Bodies& bodies,
+void AddBodies(const Frame& frame, std::size_t particles, double usual,
+               const space::SpaceBins& bins, const space::Bodies& bodies,
                space::SurfaceSize& size) {
   const bool wraps = frame.box && frame.box->wraps;
   std::uint64_t in_bodies = 0;
@@ -143,9 +153,7 @@ void AddBodies(const Frame& frame, std::size_t particles, double usual, const sp
     size.samples += std::min<std::uint64_t>(body.particles, kMaxSamples);
   }
   // In a box that wraps, copies without a body may become ellipsoids, too.
-  const std::uint64_t alone =
-      wraps ? static_cast<std::uint64_t>(std::ranges::count(bodies.body_of_particle, kNoIndex))
-            : particles - in_bodies;
+  const std::uint64_t alone = wraps ? CountAlone(bins, bodies) : particles - in_bodies;
   size.bodies = bodies.bodies.size() + alone;
   size.lone = alone;
   size.has_large_lone =
@@ -366,7 +374,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
     space::FindCrossings(bricks, b.field, b.crossings);
     size.edges = b.crossings.edge_count;
     if (placement != SurfacePlacement::kMarchingCubes) size.loops = b.crossings.loop_count;
-    AddBodies(frame, lifted.particles, h * h * h, b.bodies, size);
+    AddBodies(frame, lifted.particles, h * h * h, b.bins, b.bodies, size);
     absl::Status reserved = Reserve(size, control.memory);
     if (reserved.ok()) space::ListSteps(bricks, b.crossings);
     return reserved;

@@ -28,7 +28,7 @@ TEST(WallField, TilesBehindOneOfManyEndlessWallsAreSolid) {
   for (int x = -kTiles; x < kTiles; ++x) directory.Insert({0, x});
   directory.Seal();
   WallField field;
-  field.ListLines(walls, nullptr, 1, directory);
+  field.ListLines({walls}, 1, directory);
   field.FindTiles(directory);
 
   std::size_t fluid = 0, near = 0, solid = 0, both = 0;

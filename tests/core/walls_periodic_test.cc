@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -370,7 +371,8 @@ TEST(WallsPeriodic, ErrorsNameAWallOrAGivenParticle) {
               AllOf(StartsWith("parameters.walls[1].points"), HasSubstr("periodic axis")));
   EXPECT_THAT(refused({{0, 0, 9, 0, 9, 9}}, box), HasSubstr("clockwise obstacle"));
   EXPECT_EQ(refused({{9, 9, 9, 0, 0, 0}}, box), "");
-  EXPECT_THAT(refused({{9, 9, 9, 0, 0, 0}}, BoxOf(50, 50)), StartsWith("parameters.walls[0]"));
+  EXPECT_THAT(refused({{9, 9, 9, 0, 0, 0}}, BoxOf(50, 50)),
+              AllOf(StartsWith("parameters.walls[0]"), HasSubstr("both axes")));
   // Obstacles far away, and obstacles with too many images.
   const auto in_frame = [&](const Wall& wall) {
     const auto violation = RefusalOf(InChannel(box, {wall}), WaveOnBottom());
@@ -380,8 +382,12 @@ TEST(WallsPeriodic, ErrorsNameAWallOrAGivenParticle) {
   ReconstructOnce(InChannel(box, {many_lengths_away}), WaveOnBottom());
   EXPECT_THAT(in_frame(PolygonWall(1e9, 5, 3, 5, 0, false)),
               AllOf(StartsWith("parameters.walls[0].points"), HasSubstr("1e6 lengths")));
-  EXPECT_THAT(in_frame(PolygonWall(0, 5, 4e7, 5, 0, false)),
-              AllOf(StartsWith("parameters.walls "), HasSubstr("1048576 points")));
+  // Beside the fluid along one axis, and at any distance along the other.
+  ReconstructionParameters beside = InChannel(BoxOf(48, 48), {});
+  beside.walls = {{{80, 1e20, 80, 1.1e20, 81, 1.1e20, 81, 1e20}}};
+  ReconstructOnce(beside, support::Shifted(support::Disc(5), 20, 20));
+  EXPECT_THAT(in_frame(PolygonWall(0, 5, 4e6, 5, 0, false)),
+              AllOf(StartsWith("parameters.walls "), HasSubstr("65536 points")));
   // A fluid particle far from the box, after wall particles.
   Particles scene = WaveOnBottom();
   scene.phases.assign(scene.size(), 1);
@@ -389,9 +395,108 @@ TEST(WallsPeriodic, ErrorsNameAWallOrAGivenParticle) {
   scene.xy[2 * 20] = 1e8;
   ReconstructionParameters parameters = InChannel(box, {});
   parameters.wall_phases = {2};
-  const auto violation = RefusalOf(parameters, scene);
+  auto violation = RefusalOf(parameters, scene);
   ASSERT_TRUE(violation.has_value());
   EXPECT_EQ(violation->field, "positions[20].x");
+  // The lifted fluid is beyond the lattice, and so are the images of the walls.
+  scene.xy[2 * 20] = 3;
+  parameters.box = Channel(3e9, 4e4);
+  std::swap(scene.phases[0], scene.phases[9]);
+  violation = RefusalOf(parameters, scene);
+  ASSERT_TRUE(violation.has_value());
+  EXPECT_EQ(violation->field, "positions[1].x") << "the first particle of the walls";
+  std::ranges::fill(scene.phases, 1.0f);
+  scene.phases[0] = 2;
+  scene.xy[1] = -1e6;  // Out of the range.
+  violation = RefusalOf(parameters, scene);
+  ASSERT_TRUE(violation.has_value());
+  EXPECT_EQ(violation->field, "positions[1].x") << "the first particle of the fluid";
+  scene.xy[1] = .5;
+  // A wall particle far from the box, with the spacing known and unknown.
+  parameters.box = box;
+  scene.xy[0] = 1e8;
+  violation = RefusalOf(parameters, scene);
+  ASSERT_TRUE(violation.has_value());
+  EXPECT_EQ(violation->field, "positions[0].x");
+  EXPECT_THAT(violation->rule, HasSubstr("1e6 lengths"));
+  Particles few;
+  few.Add(5, 5);
+  few.Add(1e19, 5);
+  few.phases = {1, 2};
+  parameters.spacing.reset();
+  EXPECT_EQ(ReconstructOnce(parameters, few).rings.RingCount(), 0u);
+}
+
+// A thin obstacle far from the origin, whose images round to lines.
+TEST(WallsPeriodic, RoundedImagesOfObstaclesStayObstacles) {
+  const PeriodicBox box = Channel(1e7, 100);
+  const Particles block = support::Lattice(12, 12, 1e7 + 40.5, 40.5);
+  for (const double width : {1e-2, 1e-10}) {
+    const Wall thin{{46, 44, 46, 47, 46 + width, 47, 46 + width, 44}};
+    EXPECT_NEAR(ReconstructOnce(InChannel(box, {thin}), block).statistics.area, 144, 1) << width;
+  }
+}
+
+// The plane of the particles decides which axis of the box is which.
+TEST(WallsPeriodic, FramesInOtherPlanesHaveTheSameOutlines) {
+  const Result expected = ReconstructOnce(InChannel(Channel(), {kBottom}), WaveOnBottom());
+  std::vector<double> xyz;
+  for (std::size_t k = 0; k < WaveOnBottom().size(); ++k) {
+    xyz.insert(xyz.end(), {7, WaveOnBottom().x(k), WaveOnBottom().y(k)});
+  }
+  const Frame in_space{.positions = std::span<const double>(xyz), .components = 3};
+  ReconstructionParameters parameters = InChannel({}, {kBottom});
+  parameters.plane = Plane::kYz;
+  parameters.box->axes = {std::nullopt, PeriodicAxis{0, kChannelLength}, std::nullopt};
+  EXPECT_EQ(ReconstructOnce(parameters, in_space).rings, expected.rings);
+  // Across the periodic axis, here of frames with x and y.
+  parameters.plane = Plane::kXz;
+  const auto violation = RefusalOf(parameters, WaveOnBottom());
+  ASSERT_TRUE(violation.has_value());
+  EXPECT_EQ(violation->field, "parameters.walls[0].points");
+}
+
+// The box grows, with an obstacle and wall particles, and positions are filtered.
+TEST(WallsPeriodic, BoxesOfFramesAndTheNoiseFilterApply) {
+  for (const bool are_particles : {false, true}) {
+    ReconstructionParameters parameters = InChannel(Channel(), {});
+    parameters.walls = {PolygonWall(24, 4, 2.5, 12, .1, false)};
+    if (are_particles) {
+      parameters.wall_phases = {2};
+    } else {
+      parameters.walls.push_back(kBottom);
+      parameters.noise_filter = .5;
+    }
+    RingStream stream(parameters);
+    for (int step = 0; step < 6; ++step) {
+      SCOPED_TRACE(testing::Message() << are_particles << " " << step);
+      const double stretch = 1 + .01 * step, length = kChannelLength * stretch;
+      Particles scene = WaveOnBottom();
+      scene.phases.assign(scene.size(), 1);
+      scene.Add(support::Lattice(48, 2, .5, -1.5));
+      scene.phases.resize(scene.size(), 2);
+      for (std::size_t k = 0; k < scene.size(); ++k) {
+        scene.xy[2 * k] *= stretch;
+        scene.ids.push_back(k);
+      }
+      Particles fluid;
+      for (std::size_t k = 0; k < scene.size(); ++k) {
+        const bool is_covered = std::hypot(scene.x(k) - 24, scene.y(k) - 4) < 3;
+        if (is_covered || (!are_particles && scene.phases[k] == 2)) continue;
+        fluid.Add(scene.x(k), scene.y(k));
+        fluid.phases.push_back(scene.phases[k]);
+        fluid.ids.push_back(scene.ids[k]);
+      }
+      Frame frame = fluid.AsFrame();
+      frame.box = Channel(0, length);
+      const Rings& rings = stream.Next(frame);
+      ExpectValid(stream.result(), Fill::kGreedy);
+      ASSERT_EQ(rings.RingCount(), 2u);
+      // The bottom, and most of the obstacle, which has 15.5.
+      EXPECT_GT(WettedLength(rings), length + 8);
+      EXPECT_LT(WettedLength(rings), length + 16);
+    }
+  }
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ void AppendDot(std::string& path, const double* point, const Picture& picture) {
 /// The diameter of the dot of a particle, in SVG units. With own sizes, a share of the particle's
 /// size; grains are drawn as large as they are.
 double DotOf(const FrameRecord& frame, std::size_t particle, const Picture& picture) {
-  if (!frame.particle_sizes.empty()) {
+  if (frame.HasParticleSizes()) {
     const double share = frame.are_discs ? 1 : kDotSpacings;
     const double size = share * double{frame.particle_sizes[particle]} * picture.scale();
     return kDotStep * std::round(std::clamp(size, kSmallestDot, kLongerSide) / kDotStep);
@@ -122,8 +122,8 @@ void AppendParticles(std::string& out, const FrameRecord& frame, const Picture& 
     AppendDot(paths[DotOf(frame, k, picture)], at, picture);
   }
   for (const auto& [diameter, path] : paths) {
-    AppendAll(out, R"(<path class=")", frame.are_discs ? "grains" : "particles",
-              R"(" stroke-width=")");
+    const bool are_discs = frame.are_discs && frame.HasParticleSizes();
+    AppendAll(out, R"(<path class=")", are_discs ? "grains" : "particles", R"(" stroke-width=")");
     AppendNumber(out, std::round(diameter * kSteps) / kSteps);
     AppendAll(out, R"(" d=")", path, "\"/>\n");
   }

@@ -163,6 +163,7 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
 // Least length of a box, in kernel radii. Neighbours in a body are at most two kernel radii apart;
 // in a box of four, each particle has only one image that near.
 constexpr double kMinBoxLength = 4;
+constexpr double kRoundingOfSizes = 1e-6;
 
 // Checks the box, and that slices and the placement do not exclude it.
 absl::Status CheckBox(const ReconstructionParameters& p) {
@@ -318,10 +319,10 @@ absl::Status Validate(const PeriodicBox& box, double kernel_radius, double spaci
     }
     if (spacing == 0) continue;
     const double least = kMinBoxLength * kernel_radius * spacing;
-    if (length < least) {
-      return OutOfRange(
-          field + "length", length,
-          absl::StrCat("must be at least four kernel radii, ", ShortestNumber(least)));
+    // Sizes are roots of float32 volumes.
+    if (length < (1 - kRoundingOfSizes) * least) {
+      return OutOfRange(field + "length", length,
+                        absl::StrCat("must be at least four kernel radii, ", least));
     }
     if (length > box.kMostSpacings * spacing) {
       return OutOfRange(field + "length", length, "must be at most 1e8 spacings");

@@ -71,16 +71,18 @@ absl::Status CheckPoints(const std::string& field, std::span<const double> point
 // Checks a wall in a periodic box: endless lines must be their own images, and other walls must be
 // obstacles, because the fluid of a tank is at one place only.
 absl::Status CheckInBox(const std::string& field, std::span<const double> points,
-                        const PeriodicBox& box, Plane plane) {
-  const Axes axes = AxesOf(plane);
-  const bool is_periodic_along_first = box.axes[static_cast<std::size_t>(axes.first)].has_value();
-  const bool is_periodic_along_second = box.axes[static_cast<std::size_t>(axes.second)].has_value();
+                        const PeriodicBox& box, const Axes& axes) {
+  const bool along_first = box.axes[static_cast<std::size_t>(axes.first)].has_value();
+  const bool along_second = box.axes[static_cast<std::size_t>(axes.second)].has_value();
   if (points.size() == 4) {
-    const bool is_image = (!is_periodic_along_first || points[1] == points[3]) &&
-                          (!is_periodic_along_second || points[0] == points[2]);
+    const bool is_image =
+        (!along_first || points[1] == points[3]) && (!along_second || points[0] == points[2]);
     if (is_image) return absl::OkStatus();
     return Refused(field, "an endless line",
-                   "must be parallel to the periodic axis, so that it meets itself at the faces");
+                   along_first && along_second
+                       ? "must be absent if both axes are periodic: it would meet its images"
+                       : "must be parallel to the periodic axis, so that it meets itself at the "
+                         "faces");
   }
   double area = 0;
   for (std::size_t k = 2; k + 2 < points.size(); k += 2) {
@@ -176,10 +178,11 @@ absl::Status CheckWallPlanes(std::span<const WallPlane> planes, double kernel_ra
       }
       const double low = plane.is_fluid_above ? plane.position : planes[other].position;
       const double high = plane.is_fluid_above ? planes[other].position : plane.position;
-      if (high - low > 0 && high - low >= kernel_radius * spacing) continue;
+      // The sizes of particles are rounded.
+      if (high - low > 0 && high - low >= (1 - 1e-6) * kernel_radius * spacing) continue;
       return Refused(field + ".position", ShortestNumber(plane.position),
                      absl::StrCat("must leave a kernel radius of fluid between this wall and ",
-                                  name, ", ", ShortestNumber(kernel_radius * spacing)));
+                                  name, ", ", kernel_radius * spacing));
     }
   }
   return absl::OkStatus();
@@ -218,8 +221,18 @@ absl::Status CheckWalls(const ReconstructionParameters& p) {
   if (absl::Status status = CheckOthers(p, "walls"); !status.ok()) return status;
   for (std::size_t k = 0; k < p.walls.size(); ++k) {
     const std::string field = absl::StrCat("walls[", k, "].points");
-    absl::Status status = CheckPoints(field, p.walls[k].points);
-    if (status.ok() && p.box) status = CheckInBox(field, p.walls[k].points, *p.box, p.plane);
+    if (absl::Status status = CheckPoints(field, p.walls[k].points); !status.ok()) return status;
+  }
+  // With another plane, frames decide the axes.
+  if (!p.box || p.plane != Plane::kXy) return absl::OkStatus();
+  return CheckWallsInBox(p.walls, *p.box, AxesOf(p.plane));
+}
+
+absl::Status CheckWallsInBox(std::span<const Wall> walls, const PeriodicBox& box,
+                             const Axes& axes) {
+  for (std::size_t k = 0; k < walls.size(); ++k) {
+    const std::string field = absl::StrCat("walls[", k, "].points");
+    absl::Status status = CheckInBox(field, walls[k].points, box, axes);
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "absl/status/status.h"
+#include "frame/frame_view.h"
 #include "partiemc/parameters.h"
 
 namespace partiemc {
@@ -20,7 +21,11 @@ absl::Status CheckWalls(const ReconstructionParameters& parameters);
 absl::Status CheckWallPlanes(std::span<const WallPlane> planes, double kernel_radius,
                              double spacing);
 
-/// Checks that no wall lies across a periodic axis. Errors: INVALID_ARGUMENT.
+/// Checks the walls of an outline in a periodic box. `axes`: of the plane of the particles. Errors:
+/// INVALID_ARGUMENT for endless lines that are not their own images, and for tanks.
+absl::Status CheckWallsInBox(std::span<const Wall> walls, const PeriodicBox& box, const Axes& axes);
+
+/// Checks that no plane of a surface lies across a periodic axis. Errors: INVALID_ARGUMENT.
 absl::Status CheckAxesOfWalls(std::span<const WallPlane> planes,
                               const std::optional<PeriodicBox>& box);
 

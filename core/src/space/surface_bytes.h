@@ -22,7 +22,7 @@ struct SurfaceSize {
   bool is_simplified = false;
   std::uint64_t wall_axes = 0;  ///< Axes that have walls.
   std::uint64_t box_axes = 0;   ///< Axes along which bodies are cut at a periodic box.
-  /// Bytes of the scratch of a periodic box (periodic/lift.h) or of walls (walls/wall_images.h).
+  /// Bytes of the scratch of a periodic box (periodic/lift.h) and of walls (walls/wall_images.h).
   std::uint64_t lift_bytes = 0;
   std::uint64_t samples = 0;  ///< Particles that a state may store; 0 without ids.
 };

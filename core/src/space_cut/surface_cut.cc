@@ -78,8 +78,14 @@ void FillMesh(const SurfaceCutInput& input, const Surface& surface, PlaneCutScra
   mesh.is_clipped.assign(mesh.shell_of.size(), 0);
 }
 
-/// Cuts the mesh at all planes, moved by `shift` steps.
-bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& s) {
+/// The moves of a try, as indices of kShifts.
+struct Moves {
+  std::size_t faces = 0, walls = 0;
+};
+
+/// Cuts the mesh at all planes. If this fails, returns false and advances the moves of the planes
+/// that fail: walls stay at rest if only faces fail, because points on a moved wall must return.
+bool CutAtPlanes(const SurfaceCutInput& input, Moves& moves, SurfaceCutScratch& s) {
   std::array<double, 3> farthest{};
   for (const AxisPlane& plane : input.planes) {
     double& far = farthest[static_cast<std::size_t>(plane.axis)];
@@ -92,12 +98,19 @@ bool CutAtPlanes(const SurfaceCutInput& input, double shift, SurfaceCutScratch& 
         plane.is_wall ? std::abs(plane.at) : farthest[static_cast<std::size_t>(plane.axis)];
     const double step =
         kShiftSpacings * input.spacing + kShiftBits * std::numeric_limits<double>::epsilon() * far;
-    const double move = shift * step * kShiftAlong[static_cast<std::size_t>(plane.axis)];
+    std::size_t& of_plane = plane.is_wall ? moves.walls : moves.faces;
+    const double move =
+        kShifts[of_plane] * step * kShiftAlong[static_cast<std::size_t>(plane.axis)];
     plane.at += plane.is_wall && !plane.keeps_above ? -move : move;
     if (!InSpaceDomain(plane.at)) plane.at = 0;
-    if (!CutAtPlane(plane, kClearance * step, s.plane, s.mesh)) return false;
+    if (CutAtPlane(plane, kClearance * step, s.plane, s.mesh)) continue;
+    ++of_plane;
+    return false;
   }
-  return CapPlanes(input.inner_step, s.plane, s.mesh);
+  if (CapPlanes(input.inner_step, s.plane, s.mesh)) return true;
+  ++moves.faces;
+  ++moves.walls;
+  return false;
 }
 
 /// Moves the points of caps on walls to the given planes.
@@ -382,23 +395,27 @@ void Assembly::WriteParents() {
 
 bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& s, SurfacePieces& pieces,
                 Surface& surface) {
-  // With walls, the second half of the tries leaves the points where the cuts are.
   const bool has_walls = std::ranges::any_of(input.planes, &AxisPlane::is_wall);
-  const std::size_t shifts = has_walls ? kShiftsOfWalls : kShifts.size();
-  const std::size_t tries = has_walls ? 2 * shifts : shifts;
-  for (std::size_t attempt = 0; attempt < tries; ++attempt) {
-    ThrowIfCancelled();
-    const double shift = kShifts[attempt % shifts];
-    FillMesh(input, surface, s.plane, s.mesh);
-    if (!CutAtPlanes(input, shift, s)) continue;
-    const bool returns = has_walls && shift != 0 && attempt < shifts;
-    if (returns) ReturnToWalls(input, s.mesh);
-    Assembly(input, surface, s, pieces).Run();
-    if (returns && !Validate(s.surface).ok()) continue;
-    s.surface.statistics = surface.statistics;
-    std::swap(s.surface.attributes, surface.attributes);
-    std::swap(s.surface, surface);
-    return true;
+  const std::size_t most = has_walls ? kShiftsOfWalls : kShifts.size();
+  // With walls, the second half of the tries leaves the points where the cuts are.
+  for (const bool may_return : {true, false}) {
+    for (Moves moves; moves.faces < most && moves.walls < most;) {
+      ThrowIfCancelled();
+      const bool returns = may_return && moves.walls > 0;
+      FillMesh(input, surface, s.plane, s.mesh);
+      if (!CutAtPlanes(input, moves, s)) continue;
+      if (returns) ReturnToWalls(input, s.mesh);
+      Assembly(input, surface, s, pieces).Run();
+      if (returns && !Validate(s.surface).ok()) {
+        ++moves.walls;
+        continue;
+      }
+      s.surface.statistics = surface.statistics;
+      std::swap(s.surface.attributes, surface.attributes);
+      std::swap(s.surface, surface);
+      return true;
+    }
+    if (!has_walls) break;
   }
   return false;
 }

@@ -67,15 +67,15 @@ struct SurfacePieces {
 /// Of the outer parts of a body, the largest gets the particles, identity and parents of the body's
 /// first outer shell; the others get none. Whole cavities keep theirs.
 ///
-/// If a vertex lies on a plane, or rounding leaves a decision open, all planes move. Those with the
-/// same axis move alike, by up to .00021 spacings plus 3e-9 of their largest coordinate (kShifts in
-/// surface_cut.cc). Walls move each on its own, to the side that is kept, and then planes move by
-/// at most a sixth of this. The points on a moved wall return to the wall, if Validate accepts this
-/// surface. If Validate rejects it for every move, they stay on the moved wall. Returns false, with
-/// `surface` unchanged, if this does not help, which is a bug. Requires: S1 to S5;
-/// `surface.attributes` without values. Deterministic. Cost: linear in the surface, plus CutAtPlane
-/// and CapPlanes, plus ShellsAround if a shell with a cavity falls into several parts. Throws
-/// Cancelled as ThrowIfCancelled, with `surface` unchanged.
+/// If a vertex lies on a plane, or rounding leaves a decision open, all faces of a box move, or all
+/// walls. Faces with the same axis move alike, by up to .00021 spacings plus 3e-9 of their largest
+/// coordinate (kShifts in surface_cut.cc). Walls move each on its own, to the side that is kept,
+/// and with walls planes move by at most a sixth of this. The points on a moved wall return to the
+/// wall, if Validate accepts this surface. If Validate rejects it for every move, they stay on the
+/// moved wall. Returns false, with `surface` unchanged, if this does not help, which is a bug.
+/// Requires: S1 to S5; `surface.attributes` without values. Deterministic. Cost: linear in the
+/// surface, plus CutAtPlane and CapPlanes, plus ShellsAround if a shell with a cavity falls into
+/// several parts. Throws Cancelled as ThrowIfCancelled, with `surface` unchanged.
 [[nodiscard]] bool CutSurface(const SurfaceCutInput& input, SurfaceCutScratch& scratch,
                               SurfacePieces& pieces, Surface& surface);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "absl/strings/str_cat.h"
@@ -26,13 +27,12 @@ struct Box {
   }
 };
 
-// The images along one axis that overlap a range: by [first, last] lengths.
+// The images along one axis that overlap a range: by [first, last] lengths. Whole numbers.
 struct Images {
   double first = 0, last = 0;
 
   double Count() const { return std::max(0.0, last - first + 1); }
-  // Whether images are so far away that numbers of lengths lose digits.
-  bool IsFar() const { return std::max(std::abs(first), std::abs(last)) > kMostLengths; }
+  bool AreFar() const { return std::max(std::abs(first), std::abs(last)) > kMostLengths; }
 };
 
 // The images of [low, high] that overlap [from, to].
@@ -42,33 +42,37 @@ Images ImagesIn(const std::optional<PeriodicAxis>& period, double low, double hi
   return {std::ceil((from - high) / period->length), std::floor((to - low) / period->length)};
 }
 
-// The images of a box that overlap the range, by axis.
-std::array<Images, 2> ImagesIn(const WallRange& range, const Box& box) {
-  return {ImagesIn(range.periods[0], box.low.x, box.high.x, range.low.x, range.high.x),
-          ImagesIn(range.periods[1], box.low.y, box.high.y, range.low.y, range.high.y)};
-}
+// The images of a box that overlap a range, by axis.
+struct PlaneImages {
+  Images x, y;
 
-double CountOf(const std::array<Images, 2>& images) {
-  return images[0].Count() * images[1].Count();
-}
+  PlaneImages(const WallRange& range, const Box& box)
+      : x(ImagesIn(range.periods[0], box.low.x, box.high.x, range.low.x, range.high.x)),
+        y(ImagesIn(range.periods[1], box.low.y, box.high.y, range.low.y, range.high.y)) {}
 
-// Calls visit(offset) for each image.
+  double Count() const { return x.Count() * y.Count(); }
+  // Whether numbers of lengths are so large that they lose digits. Requires: Count() is not 0.
+  bool AreFar() const { return x.AreFar() || y.AreFar(); }
+};
+
+// Calls visit(offset) for each image. Requires: the images are not far.
 template <typename Visit>
-void ForEachOffset(const WallRange& range, const std::array<Images, 2>& images,
-                   const Visit& visit) {
+void ForEachOffset(const WallRange& range, const PlaneImages& images, const Visit& visit) {
+  if (images.Count() == 0) return;
   const auto length = [&](std::size_t k) {
     return range.periods[k] ? range.periods[k]->length : 0;
   };
-  for (double j = images[1].first; j <= images[1].last; ++j) {
-    for (double i = images[0].first; i <= images[0].last; ++i) {
-      visit(Point{i * length(0), j * length(1)});
+  const auto whole = [](double lengths) { return static_cast<std::int64_t>(lengths); };
+  for (std::int64_t j = whole(images.y.first); j <= whole(images.y.last); ++j) {
+    for (std::int64_t i = whole(images.x.first); i <= whole(images.x.last); ++i) {
+      visit(Point{static_cast<double>(i) * length(0), static_cast<double>(j) * length(1)});
     }
   }
 }
 
 }  // namespace
 
-WallRange RangeAround(const Frame& frame, Plane plane, double margin) {
+WallRange RangeOf(const Frame& frame, Plane plane) {
   WallRange range;
   const Axes axes = AxesOf(frame, plane);
   if (frame.box) {
@@ -76,30 +80,39 @@ WallRange RangeAround(const Frame& frame, Plane plane, double margin) {
                      frame.box->axes[static_cast<std::size_t>(axes.second)]};
   }
   Box box;
-  for (std::size_t k = 0; k < frame.ParticleCount(); ++k) box.Include(PositionOf(frame, plane, k));
-  range.low = {box.low.x - margin, box.low.y - margin};
-  range.high = {box.high.x + margin, box.high.y + margin};
+  VisitPositions(frame, plane, [&](const auto& reader) {
+    for (std::size_t k = 0; k < frame.ParticleCount(); ++k) box.Include(reader[k]);
+  });
+  range.low = box.low;
+  range.high = box.high;
   return range;
 }
 
-absl::Status WallCopies::TakeObstacles(std::span<const Wall> walls, const WallRange& range) {
+WallRange Widened(WallRange range, double margin) {
+  range.low = {range.low.x - margin, range.low.y - margin};
+  range.high = {range.high.x + margin, range.high.y + margin};
+  return range;
+}
+
+absl::Status WallCopies::TakeObstacles(std::span<const Wall> walls, const WallRange& range,
+                                       ReserveBytes reserve) {
   wall_count_ = 0;
-  double points = 0;
   const auto images_of = [&](const Wall& wall) {
     Box box;
     for (std::size_t k = 0; k < wall.points.size() / 2; ++k) box.Include(PointAt(wall.points, k));
-    return ImagesIn(range, box);
+    return PlaneImages(range, box);
   };
   const auto is_endless = [](const Wall& wall) { return wall.points.size() == 4; };
+  double points = 0;
   for (std::size_t k = 0; k < walls.size(); ++k) {
     if (is_endless(walls[k])) continue;
-    const std::array<Images, 2> images = images_of(walls[k]);
-    if (CountOf(images) == 0) continue;
-    if (std::ranges::any_of(images, [](const Images& of) { return of.IsFar(); })) {
+    const PlaneImages images = images_of(walls[k]);
+    if (images.Count() > 0 && images.AreFar()) {
       return InvalidFrame(kReasonOutOfRange, absl::StrCat("parameters.walls[", k, "].points"),
-                          "an obstacle far away", "must be at most 1e6 lengths away from the box");
+                          "an obstacle with images over more than 1e6 lengths",
+                          "must reach at most 1e6 lengths of the box away from the box");
     }
-    points += CountOf(images) * static_cast<double>(walls[k].points.size() / 2);
+    points += images.Count() * static_cast<double>(walls[k].points.size() / 2);
   }
   if (points > static_cast<double>(kMostPoints)) {
     return InvalidFrame(kReasonOutOfRange, "parameters.walls",
@@ -107,6 +120,8 @@ absl::Status WallCopies::TakeObstacles(std::span<const Wall> walls, const WallRa
                         absl::StrCat("must have at most ", kMostPoints,
                                      " points with their images in the periodic box"));
   }
+  absl::Status status = reserve(static_cast<std::uint64_t>(points) * kBytesPerPoint);
+  if (!status.ok()) return status;
   const auto add = [&](const Wall& wall, const Point& offset) {
     if (wall_count_ == walls_.size()) walls_.emplace_back();
     std::vector<double>& to = walls_[wall_count_++].points;
@@ -125,28 +140,42 @@ absl::Status WallCopies::TakeObstacles(std::span<const Wall> walls, const WallRa
   return absl::OkStatus();
 }
 
-absl::Status WallCopies::TakeParticles(
-    const Frame& frame, Plane plane, const WallRange& range,
-    absl::FunctionRef<absl::Status(std::uint64_t bytes)> reserve) {
+absl::Status WallCopies::TakeParticles(const WallParticleInput& input, const WallRange& range,
+                                       ReserveBytes reserve) {
+  const Frame& frame = input.frame;
   const auto components = static_cast<std::size_t>(frame.components);
-  const Axes axes = AxesOf(frame, plane);
+  const Axes axes = AxesOf(frame, input.plane);
   const auto images_of = [&](std::size_t particle) {
     Box box;
-    box.Include(PositionOf(frame, plane, particle));
-    return ImagesIn(range, box);
+    box.Include(PositionOf(frame, input.plane, particle));
+    return PlaneImages(range, box);
   };
   double count = 0;
-  for (std::size_t k = 0; k < frame.ParticleCount(); ++k) count += CountOf(images_of(k));
+  for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
+    if (k % kParticlesPerCheck == 0) ThrowIfCancelled();
+    const PlaneImages images = images_of(k);
+    if (images.Count() > 0 && images.AreFar()) {
+      const Point at = PositionOf(frame, input.plane, k);
+      const bool is_first = images.x.AreFar();
+      return InvalidFrame(
+          kReasonOutOfRange,
+          CoordinateField("positions", input.names[k], is_first ? axes.first : axes.second),
+          ShortestNumber(is_first ? at.x : at.y), "must be at most 1e6 lengths away from the box");
+    }
+    count += images.Count();
+  }
   if (count > static_cast<double>(FrameLimits::kMostParticles)) {
     return InvalidFrame(kReasonTooManyParticles, "positions", ShortestNumber(count),
                         absl::StrCat("must be at most ", FrameLimits::kMostParticles,
                                      " with the images of wall particles in the periodic box"));
   }
   const auto all = static_cast<std::size_t>(count);
-  const std::size_t each = components * sizeof(double) + sizeof(float);
+  const std::size_t each = components * sizeof(double) + sizeof(float) + sizeof(std::uint32_t);
   if (absl::Status status = reserve(all * each); !status.ok()) return status;
   positions_.clear();
   volumes_.clear();
+  names_.clear();
+  names_.reserve(all);
   positions_.reserve(components * all);
   volumes_.reserve(frame.volumes.empty() ? 0 : all);
   std::visit(
@@ -162,6 +191,7 @@ absl::Status WallCopies::TakeParticles(
                                                                    : 0));
             }
             if (!frame.volumes.empty()) volumes_.push_back(frame.volumes[k]);
+            names_.push_back(input.names[k]);
           });
         }
       },

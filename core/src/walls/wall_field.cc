@@ -190,9 +190,9 @@ void WallField::ListShortLine(const TileDirectory& directory, std::uint32_t line
   }
 }
 
-void WallField::ListLines(std::span<const Wall> walls, const Rings* particle_walls,
-                          double cell_size, const TileDirectory& directory) {
-  lines_.Build(walls, particle_walls, cell_size, WindowOf(directory));
+void WallField::ListLines(const GivenWalls& walls, double cell_size,
+                          const TileDirectory& directory) {
+  lines_.Build(walls, cell_size, WindowOf(directory));
   near_of_tile_.assign(directory.size(), kFluid);
   pairs_.clear();
   by_row_.clear();

@@ -34,8 +34,7 @@ class WallField {
 
   /// Reads the walls (WallLines::Build). Counts the tiles near lines, and the pairs of a line and a
   /// tile near it. Cost: linear in tiles and lines, and in the product of tiles and long lines.
-  void ListLines(std::span<const Wall> walls, const Rings* particle_walls, double cell_size,
-                 const TileDirectory& directory);
+  void ListLines(const GivenWalls& walls, double cell_size, const TileDirectory& directory);
   std::size_t PairCount() const { return pair_count_; }
   std::size_t TileCount() const { return near_count_; }
 

@@ -141,8 +141,7 @@ void WallLines::AddEndless(const Point& a, const Point& b, double cell_size, con
   solids_.back().last = first + 1;
 }
 
-void WallLines::Build(std::span<const Wall> walls, const Rings* particle_walls, double cell_size,
-                      const Window& window) {
+void WallLines::Build(const GivenWalls& walls, double cell_size, const Window& window) {
   edges_.clear();
   world_.clear();
   loops_.clear();
@@ -154,7 +153,7 @@ void WallLines::Build(std::span<const Wall> walls, const Rings* particle_walls, 
   const auto end_solid = [&] {
     if (solids_.back().first == solids_.back().last) solids_.pop_back();
   };
-  for (const Wall& wall : walls) {
+  for (const Wall& wall : walls.fixed) {
     const auto at = [&](std::size_t k) { return PointAt(wall.points, k); };
     begin_solid(false);
     if (wall.points.size() == 4) {
@@ -162,14 +161,14 @@ void WallLines::Build(std::span<const Wall> walls, const Rings* particle_walls, 
       continue;
     }
     const double area = AddLoop(wall.points.size() / 2, cell_size, window, at);
-    solids_.back().is_inside = area < 0;
+    solids_.back().is_inside = walls.are_obstacles || area < 0;
     end_solid();
   }
-  if (particle_walls == nullptr) return;
+  if (walls.of_particles == nullptr) return;
   begin_solid(true);
-  for (std::size_t ring = 0; ring < particle_walls->RingCount(); ++ring) {
+  for (std::size_t ring = 0; ring < walls.of_particles->RingCount(); ++ring) {
     // Rings have the solid on their left.
-    const std::span<const double> points = particle_walls->RingPoints(ring);
+    const std::span<const double> points = walls.of_particles->RingPoints(ring);
     const std::size_t count = points.size() / 2;
     AddLoop(count, cell_size, window,
             [&](std::size_t k) { return PointAt(points, count - 1 - k); });

@@ -42,6 +42,15 @@ struct NearestWall {
   double height = std::numeric_limits<double>::infinity();  ///< In cells; negative in the solid.
 };
 
+/// The walls of a frame.
+struct GivenWalls {
+  std::span<const Wall> fixed;
+  const Rings* of_particles = nullptr;  ///< Outlines of wall particles; null: none.
+  /// Polygons are obstacles, however they are oriented: rounding may turn the image of a thin
+  /// obstacle around.
+  bool are_obstacles = false;
+};
+
 /// The lines of all walls. They form loops: closed polygons, and endless lines. One or more loops
 /// bound a solid: a wall, or the body of wall particles.
 class WallLines {
@@ -55,8 +64,7 @@ class WallLines {
   /// get further points at the sides of the window, because shares of a long line are not precise.
   /// Successive points that round to the same cell coordinates become one. Requires: Validate has
   /// passed the walls. A slanted line is off by 2^-52 of the distance of its points.
-  void Build(std::span<const Wall> walls, const Rings* particle_walls, double cell_size,
-             const Window& window);
+  void Build(const GivenWalls& walls, double cell_size, const Window& window);
 
   std::span<const WallEdge> edges() const { return edges_; }
   std::size_t SolidCount() const { return solids_.size(); }

@@ -25,8 +25,9 @@ class WallParticles {
 
   /// Views of this object. Neither has the attribute of the phases.
   const Frame& fluid() const { return fluid_.frame; }
-  /// By particle of the fluid: its number in the given frame.
+  /// By particle of the fluid, or of the walls: its number in the given frame.
   std::span<const std::uint32_t> fluid_sources() const { return fluid_.sources; }
+  std::span<const std::uint32_t> wall_sources() const { return walls_.sources; }
   const Frame& walls() const { return walls_.frame; }
 
  private:

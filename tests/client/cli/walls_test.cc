@@ -231,6 +231,8 @@ TEST(WallsReplay, WrongWallsAreRefused) {
     EXPECT_THAT(refusal({"--wall", text}),
                 HasSubstr("--wall: '" + text + "'; must be X0,Y0,X1,Y1,...: two points or more"));
   }
+  EXPECT_THAT(refusal({"--wall", "y=0"}), HasSubstr("such as 0,0,1,0 for the floor y = 0"));
+  EXPECT_THAT(refusal({"--wall-plane", "z=0"}), HasSubstr("used with --surface"));
   for (const std::string text : {"type=", "type=1.5", "=1"}) {
     EXPECT_THAT(refusal({"--wall", text}), HasSubstr("type=2"));
   }

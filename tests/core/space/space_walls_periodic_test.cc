@@ -403,6 +403,11 @@ TEST(PeriodicWalls, ErrorsNameAGivenParticleOrAWall) {
   EXPECT_TRUE(violation->rule.ends_with("6, for the largest particle")) << violation->rule;
   two.volumes[1] = 4;
   EXPECT_FALSE(violation_of(two, sized));
+  // Exactly the least distance and length, but for the rounding of the size.
+  sized.wall_planes[1].position = 3 * std::cbrt(4.);
+  EXPECT_FALSE(violation_of(two, sized));
+  sized.box = BoxOf(12 * std::cbrt(4.), 0, 0);
+  EXPECT_FALSE(violation_of(two, sized));
 }
 
 }  // namespace

@@ -3,33 +3,41 @@ import type { FrameTextures } from './frame_textures';
 import { type AttributeStyle, type Camera, Programs } from './program';
 import { ownDot, ownDotDiameter, PARTICLE_ALPHA } from '../style';
 
+/** Dots of one diameter are points. Own diameters have no limit, so these dots are squares of two triangles. */
 const VERTEX = `
 uniform sampler2D particles;
-uniform sampler2D sizes;  // Own diameters, world units.
-uniform vec2 dot;         // Device pixels per world unit of an own diameter, and the least diameter of a dot.
-uniform float common;     // Diameter without own ones, device pixels.
+uniform sampler2D sizes;   // Own diameters, world units.
+uniform vec2 own;          // Device pixels per world unit of an own diameter, and the least diameter of a dot.
+uniform float equal;       // Diameter without own ones, device pixels.
 uniform sampler2D numbers;
-uniform vec2 range;       // Smallest number, and 1 / (largest - smallest).
+uniform vec2 range;        // Smallest number, and 1 / (largest - smallest).
 flat out float value;
 flat out float diameter;
+out vec2 fromCentre;       // Device pixels; of squares only.
+
+const vec2 CORNERS[6] = vec2[6](
+  vec2(-1, -1), vec2(1, -1), vec2(-1, 1), vec2(-1, 1), vec2(1, -1), vec2(1, 1));
 
 void main() {
-  value = byAttribute ? (texelFetch(numbers, at(gl_VertexID), 0).r - range.x) * range.y : 0.0;
-  gl_Position = position(pixel(texelFetch(particles, at(gl_VertexID), 0).rg));
-  diameter = bySize ? max(texelFetch(sizes, at(gl_VertexID), 0).r * dot.x, dot.y) : common;
+  int particle = bySize ? gl_VertexID / 6 : gl_VertexID;
+  value = byAttribute ? (texelFetch(numbers, at(particle), 0).r - range.x) * range.y : 0.0;
+  diameter = bySize ? max(texelFetch(sizes, at(particle), 0).r * own.x, own.y) : equal;
+  fromCentre = bySize ? (0.5 * diameter + 1.0) * CORNERS[gl_VertexID % 6] : vec2(0);
+  gl_Position = position(pixel(texelFetch(particles, at(particle), 0).rg) + fromCentre);
   gl_PointSize = diameter + 2.0;
 }
 `;
 
 const FRAGMENT = `
-flat in float diameter;
 uniform vec4 ink;
 uniform vec4 ground;   // Rim of a dot that has the colour of its surroundings.
 flat in float value;
+flat in float diameter;
+in vec2 fromCentre;
 out vec4 colour;
 
 void main() {
-  float away = length(gl_PointCoord - 0.5) * (diameter + 2.0);
+  float away = bySize ? length(fromCentre) : length(gl_PointCoord - 0.5) * (diameter + 2.0);
   float alpha = ink.a * clamp(0.5 * diameter + 0.5 - away, 0.0, 1.0);
   vec3 base = ink.rgb;
   if (byAttribute) {
@@ -67,14 +75,15 @@ export class ParticlePass {
     program.use(camera);
     program.texture('particles', textures.particles);
     program.attribute(style, textures.particleNumbers, textures.ramp);
-    program.number('common', sizes.diameter);
+    program.number('equal', sizes.diameter);
     if (own) {
       program.texture('sizes', textures.particleSizes);
-      program.vector2('dot', [share * camera.scale, own.ratio * ownDotDiameter(0)]);
+      program.vector2('own', [share * camera.scale, own.ratio * ownDotDiameter(0)]);
     }
     program.colour('ground', theme(dark).background);
     program.colour('ink', theme(dark).particle, alpha);
-    this.gl.drawArrays(this.gl.POINTS, 0, count);
+    if (own) this.gl.drawArrays(this.gl.TRIANGLES, 0, 6 * count);
+    else this.gl.drawArrays(this.gl.POINTS, 0, count);
   }
 
   destroy(): void {
