@@ -31,7 +31,8 @@ struct RecordedFrame {
   /// recordings.
   std::optional<RecordedBox> box;
   int components = 2;  ///< 3 with SequenceOptions::in_space.
-  /// x, y (, z) interleaved, world units; NaN and infinity as recorded.
+  /// x, y (, z) interleaved, world units; NaN and infinity as recorded. If a file with three
+  /// coordinates is read in 2D, a dropped coordinate that is not finite replaces the first one.
   std::vector<double> positions;
   bool float32 = false;  ///< The recording holds float32: a conversion to float32 is lossless.
   /// Area (in space, volume) per particle; empty if absent. Positive and finite, unless

@@ -14,8 +14,9 @@
 namespace partiemc::python {
 
 /// Removes the reconstruction parameters from `arguments` and converts them; None means not given.
-/// Raises partiemc.Error for a value of the wrong form, such as an unknown placement, and for
-/// surfaces and slices without a spacing. Raises TypeError for a value of the wrong type.
+/// Raises partiemc.Error for a value of the wrong form, such as an unknown placement or a `slice`
+/// that is no pair, and for surfaces and slices without a spacing. Raises TypeError for an argument
+/// of the wrong type.
 ReconstructionParameters TakeParameters(Arguments& arguments);
 /// Converts a dict of periodic axes with their bounds: {"x": (0, 10)}. Raises partiemc.Error for
 /// another dict.

@@ -1,6 +1,8 @@
-// Experiments with the default placement: switch its steps off, vary its constants.
-// Not installed and not on the wire: for the evaluation, the tests and this repository's Python
-// module. Programs use Reconstructor::Create.
+// The steps and constants of the default placement (`virtual-plane`), and variants of them. Frames
+// use the default values, and the server hashes these into checkpoints. A change of a default value
+// therefore needs a new kMethodVersion. Variants are experiments: only the evaluation, the tests
+// and this repository's Python module create them (CreateVariant). Not installed. Requests cannot
+// set steps or constants. Programs use Reconstructor::Create.
 #pragma once
 
 #include <algorithm>

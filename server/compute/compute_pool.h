@@ -22,7 +22,8 @@ namespace partiemc::server {
 
 class CallerAccount;
 
-/// A worker is dropped if no frame has needed its large buffers for this time (WarmSize).
+/// An idle worker is destroyed, with all its buffers, if for this time it has computed no frame of
+/// at least a quarter of its largest frame (WarmSize). "Memory" at ComputePool has the exception.
 inline constexpr std::chrono::seconds kWarmTime(10);
 
 /// A caller competes for the threads for this time after it submitted or finished a job.

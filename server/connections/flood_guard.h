@@ -27,8 +27,10 @@ struct Excess {
   std::size_t index = 0;  ///< In the `connections` of LargestExcess.
   Flood flood = Flood::kUnaccountedBytes;
 };
-/// Returns the connection to cut if all connections together exceed a limit. It belongs to the
-/// address with the largest sum, and there has the largest excess (or the most streams).
+/// Returns the connection to cut if all connections together exceed a limit, else nothing. First
+/// compares their unaccounted bytes (ConnectionLedger::excess), then their streams, with
+/// kConnectionsAtLimit times the limit of one connection. The connection to cut has the most of the
+/// exceeded quantity at its address. The address has the largest sum of this quantity.
 std::optional<Excess> LargestExcess(const std::vector<ExaminedConnection>& connections,
                                     const ConnectionRules& rules);
 

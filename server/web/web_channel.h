@@ -65,7 +65,8 @@ class WebChannel : public CallChannel, public std::enable_shared_from_this<WebCh
   bool is_broken() const { return break_status_.has_value(); }
   bool is_finished() const { return finished_; }
   bool is_writing() const { return writing_; }
-  /// Maximum size of one message of this call's method.
+  /// Maximum size of one received message, in bytes: the limit of frames for methods that carry
+  /// frames, else a value above the limits of all other methods. Sent messages have no limit here.
   std::uint64_t message_limit() const { return message_limit_; }
   absl::Status TooLarge(std::uint64_t bytes) const;
 

@@ -119,8 +119,8 @@ TEST_P(WarmFrame, AllocatesNothing) {
   std::vector<Particles> frames;
   for (int k = 0; k < 4; ++k) {
     support::Random random(static_cast<std::uint64_t>(k));
-    Particles frame = support::Disc(120);
-    frame.Add(support::Shifted(support::Blob(random, 12), 118 + 6 * k, 5));
+    Particles frame = support::Disc(75);
+    frame.Add(support::Shifted(support::Blob(random, 12), 73 + 6 * k, 5));
     frame.Add(support::Shifted(support::Noise(random, 200, 60), -200, 150));
     if (tested.volumes) frame.volumes.assign(frame.size(), 1.0f);
     if (tested.sizes == Sizes::kOwn) frame.volumes = VaryingVolumes(frame.size());

@@ -14,11 +14,12 @@ struct ServerFigures {
   double memory_bytes = 0;
 };
 
-/// Parses the text format of Prometheus. Empty if a figure is missing.
+/// Finds the two figures in text format of Prometheus, after its first line (an HTTP response has
+/// header lines there). Empty if a figure is missing.
 std::optional<ServerFigures> FiguresIn(std::string_view text);
 
 /// Requests http://HOST:PORT/metrics. Errors: INVALID_ARGUMENT for another form of address,
-/// UNAVAILABLE without a response, DATA_LOSS for a response without the figures.
+/// UNAVAILABLE without a connection, DATA_LOSS without a response that has the figures.
 absl::StatusOr<ServerFigures> AskFigures(const std::string& address);
 
 }  // namespace partiemc::client

@@ -130,8 +130,8 @@ void StartHistory(const NoiseFilterInput& input, std::span<const Real> positions
   });
 }
 
-// Finds the particles of both frames and their cells. Particles that moved too far become new.
-// Returns the number of occupied cells.
+// Finds the particles that both frames have, and their cells. Particles that moved too far become
+// new. Returns the number of occupied cells.
 std::size_t FindCells(const NoiseFilterInput& input, const MotionGrid& grid,
                       NoiseFilterScratch& s) {
   const std::size_t count = s.particles.size();
@@ -157,7 +157,8 @@ std::size_t FindCells(const NoiseFilterInput& input, const MotionGrid& grid,
   return s.groups.Find(s.cell_of);
 }
 
-// Lists the particles of both frames by cell.
+// Lists the particles that both frames have, once each, by their cells in this frame: sets
+// `groups`, `movers` and `cells`.
 void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilterScratch& s) {
   s.groups.Sort(s.cell_of);
   const std::span<const std::uint32_t> items = s.groups.items();
@@ -176,8 +177,9 @@ void SortByCell(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilt
   }
 }
 
-// Sets the offsets of the particles of both frames. In spacings, from the given position: the old
-// filtered position is at `offset - moved`, the local motion predicts `offset - moved + motion`.
+// Sets the offsets of the particles that both frames have. In spacings, from the given position:
+// the old filtered position is at `offset - moved`, the local motion predicts `offset - moved +
+// motion`.
 void SetOffsets(const NoiseFilterInput& input, const MotionGrid& grid, NoiseFilterScratch& s) {
   const std::size_t axes = input.axes.size();
   const double cell = input.cell_size / input.spacing;

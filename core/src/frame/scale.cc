@@ -20,8 +20,9 @@ constexpr double kGuardShareOfLightest = 0.7;
 // A node with a higher density is inside, whatever the weighted mean gives. For comparison: f is
 // about 1 inside, 0.5 on a flat boundary, 0.6 at the edge of a void with the area of six particles.
 constexpr double kSaturation = 0.85;
-// The gap term begins at this spread (sigma). The spread is 0.1 inside bodies and on their
-// boundaries, and 0.21 in the middle of a gap of 1.7 spacings.
+// The gap term begins at this spread. The spread (sigma) at a point is the larger eigenvalue of the
+// second moment of the particles about it, in R^2 (core/METHOD.md, "Notation"). It is 0.1 inside
+// bodies and on their boundaries, and 0.21 in the middle of a gap of 1.7 spacings.
 constexpr double kGapSpread = 0.21;
 // At the distance r from a lone particle, the spread is (r / R)^2. The gap term must not cut off
 // outlines with a larger reference radius r than usual, so its limit rises with (r / R)^2. The
@@ -32,7 +33,8 @@ constexpr double kSpreadSlope = 0.45;
 // Slope of f across a flat boundary, times R. This slope converts the density terms of F to
 // lengths.
 constexpr double kBoundarySlope = 1.164;
-// In space, this slope is the integral of the normalised kernel over a plane through its centre.
+// The slope of f across a flat boundary in space, times R. It is R times the integral of the
+// normalised kernel over a plane through its centre.
 constexpr double kBoundarySlopeInSpace = 315.0 / 256;
 
 // With grains, cells of size 1 are half as wide as the smallest grain.
@@ -40,9 +42,10 @@ constexpr double kGrainCell = 0.5;
 // With grains, voids of up to five touching grains are inside: there f is 0.92 or more, in the void
 // of six 0.68.
 constexpr double kGrainSaturation = 0.9;
-// With grains, the gap term begins below the spread in the void of six touching grains, 0.195, in
-// which another grain has room. In the middle between two grains, the spread has this value if
-// their gap is 0.32 diameters.
+// With grains, the gap term begins at this spread (see kGapSpread). Points with a larger spread are
+// in a gap, which is outside. In the middle of the void of six touching grains the spread is 0.195.
+// This void has room for another grain, so the limit is lower. In the middle between two grains,
+// the spread is 0.17 if their gap is 0.32 diameters.
 constexpr double kGrainGapSpread = 0.17;
 
 }  // namespace

@@ -54,10 +54,11 @@ class ArcCurveFit {
   void Add(const Point& at, double distance);
   /// Adds the junction itself.
   void AddEnd(const Point& at);
-  /// Absent if fewer than two points are up to kCurveFarthest away, or if these coincide. The bend
-  /// is fitted to the points up to kCurvatureFarthest. It is then multiplied by
-  /// max(0, 1 - noise * v / bend^2), with the variance v of the fitted bend. With fewer than five
-  /// points, the bend is 0.
+  /// Absent if fewer than two of the points with distances in [kCurveNearest, kCurveFarthest] were
+  /// added, or if these coincide. The bend is fitted to the points with distances up to
+  /// kCurvatureFarthest. It is 0 if these are fewer than five. Otherwise it is multiplied by
+  /// max(0, 1 - noise * v / bend^2), with the variance v of the fitted bend. A point of AddEnd
+  /// counts for both.
   std::optional<ArcCurve> Fit(double noise) const;
 
  private:

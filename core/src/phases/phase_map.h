@@ -31,8 +31,8 @@ struct PhaseEdge {
 struct PhaseCell {
   std::uint32_t tile = 0;
   std::uint8_t i = 0, j = 0;
-  /// The corner around which an interface runs, opposite the only outside corner of the cell;
-  /// kNoCorner for a junction.
+  /// In a cell with one outside corner: the opposite corner. It has another phase than the two
+  /// corners beside it, so the interface runs around it. kNoCorner in a cell with a junction.
   std::uint8_t corner = 0;
 
   std::uint64_t Key() const { return (std::uint64_t{tile} * kTileSize + j) * kTileSize + i; }

@@ -79,8 +79,10 @@ void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
   for (std::uint32_t component = 0; component < components; ++component) {
     const std::uint32_t root = RootOf(c.set, component);
     const std::uint32_t outer = topology.outer_ring[component];
-    // A given particle may lie in no component although its copy lies in one. `given_count` lacks
-    // such particles; JoinImages has counted them in `total`.
+    // A particle has no component if no corner of its cell is inside. The lattice lies differently
+    // at a copy, so a copy may have a component although its given particle has none. JoinImages
+    // has counted such a particle once in `total`, at the component of that copy, which need not be
+    // the root. `given_count` lacks it.
     c.total[root] += std::exchange(c.total[component], 0) + c.given_count[component];
     if (!c.own_area.empty()) c.own_area[root] += std::exchange(c.own_area[component], 0);
     if (outer != kNoRing) {

@@ -44,11 +44,13 @@ enum TriangleKind : std::uint8_t {
   kChanged = 4,  ///< Made from given triangles, and compared before.
 };
 
-/// Finds kNew triangles that are degenerate or, if there are none, pairs of triangles that
-/// intersect. Exact. Skips other degenerate triangles. `kinds`: the TriangleKind of each triangle.
-/// Requires: S1, coordinates in the domain of predicates_in_space.h. Cost: n log n in the triangles
-/// if they are of similar size. Takes the work from `limit` if there is one, and may throw
-/// TooMuchWork. `grid`: a warm buffer.
+/// Finds kNew triangles that are degenerate. If there are none, finds the pairs that intersect: of
+/// a kNew triangle and any other, and of a kKept and a kChanged triangle. Exact. Ignores other
+/// degenerate triangles, in pairs too. `kinds`: the TriangleKind of each triangle. Requires: S1
+/// (partiemc/surface.h: each edge has exactly two triangles, in opposite directions), coordinates
+/// in the domain of predicates_in_space.h. Cost: n log n in the triangles if they are of similar
+/// size. Takes the work from `limit` if there is one, and may throw TooMuchWork. `grid`: a buffer
+/// that is reused.
 void FindContacts(std::span<const double> points, std::span<const std::uint32_t> triangles,
                   std::span<const std::uint8_t> kinds, TriangleGrid& grid,
                   std::vector<Contact>& contacts, WorkLimit* limit = nullptr);

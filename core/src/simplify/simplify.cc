@@ -33,8 +33,9 @@ constexpr double kFarthestCell = 1 << 30;
 constexpr double kMostCells = 1 << 12;
 // Least side of the blocks in which a shell is simplified, in spacings.
 constexpr double kLeastBlock = 16;
-// In units of WorkLimit: a triangle in each round, and a cell where triangles stay. A cell costs
-// more, because it also takes memory.
+// In units of WorkLimit. kWorkOfTriangle counts each certified triangle in each round. kWorkOfCell
+// counts each cell that a fault marks, where certified triangles stay. It is larger, because a
+// marked cell also takes memory.
 constexpr std::uint64_t kWorkOfTriangle = 64, kWorkOfCell = 1 << 12;
 // A closed surface has at least four triangles.
 constexpr std::size_t kLeastIndices = 12;

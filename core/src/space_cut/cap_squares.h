@@ -43,8 +43,9 @@ class CapSquares {
     Place at;
     std::uint32_t shell;
   };
-  /// An edge in one row: it is near the columns [first, last]. If it crosses the middle of the row,
-  /// `at` is where, in steps.
+  /// An edge in one of the rows near it. Near: up to step / 4 away (kMargin). [first, last] are the
+  /// columns near the whole edge, not only near its part in the row. If the edge crosses the middle
+  /// of the row, `at` is the place in steps. `is_entry`: the cap is right of it.
   struct RowEdge {
     std::int32_t row, first, last;
     std::uint32_t shell;

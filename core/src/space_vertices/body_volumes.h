@@ -46,8 +46,9 @@ struct BodyVolumes {
   /// The smallest relative error of the volume of a body since BeginSearch.
   struct Best {
     double error = std::numeric_limits<double>::infinity();
-    bool is_final =
-        false;  ///< SearchVolumes does not move the body: it has returned or is settled.
+    /// SearchVolumes no longer moves the body. Either it has put the body back to its best
+    /// positions, or BeginSearch has got the body as settled.
+    bool is_final = false;
   };
   std::vector<Best> best;            ///< By body.
   std::vector<BodyStep> steps;       ///< By body: the result of the last SearchVolumes.

@@ -1,5 +1,7 @@
-// A hierarchical grid: grids with cells of different sizes, in one hash table. Each box is stored
-// once, in the grid with the smallest cells that can hold it.
+// A hierarchical grid for boxes: grids with cells of different sizes, the levels. Gives the level,
+// cell and slot of a box. The caller keeps the hash table, one for all levels (intersections.cc).
+// It stores each box once, in the cell of the lower left corner, at the level with the smallest
+// cells that are larger than the box.
 #pragma once
 
 #include <algorithm>

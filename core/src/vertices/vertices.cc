@@ -43,7 +43,8 @@ void PlaceSegment(const VertexInput& input, std::size_t k, double* target) {
   }
 }
 
-// Appends the unit vector along (x, y), or the segment's own normal if (x, y) is too short.
+// Appends the unit vector along (x, y). If (x, y) is too short, appends the outward unit vector
+// perpendicular to the segment, not the normal of the plane (normal_x, normal_y).
 void AppendNormal(double x, double y, const CellPlane& plane, std::vector<float>& normals) {
   double square = x * x + y * y;
   if (square < kWeakGradientSquare) {

@@ -290,7 +290,9 @@ void WallField::CollectCrossings(std::int32_t row) {
   std::ranges::sort(crossings_, {}, &Crossing::x);
 }
 
-// Finds the solids that contain the marks of tiles, row by row, by the crossings left of a mark.
+// Finds for each tile the solids that contain its mark, a point beside the tile (kMark). Along each
+// row of tiles, counts the crossings of closed loops left of a mark. SetTile adds the solids with
+// an endless line, and stores the result.
 void WallField::FindSolids(const TileDirectory& directory) {
   std::uint32_t tile = 0;
   is_listed_.assign(lines_.SolidCount(), 0);
