@@ -23,8 +23,8 @@
 namespace partiemc {
 namespace {
 
-// In kernel radii of the largest particle: images of wall particles reach this far beyond the
-// particles of the fluid. The outline of a wall ends there, so far away that the end has no effect.
+// In kernel radii: images of wall particles reach this far beyond the particles of the fluid. The
+// outline of a wall ends there, so far away that the end has no effect.
 constexpr double kWallMargin = 6;
 // Images of obstacles have no ends.
 constexpr double kObstacleMargin = 2;
@@ -100,6 +100,7 @@ absl::Status FindImages(const FrameWallsInput& input, FrameMemory& memory, Works
 ReconstructionParameters WallParametersOf(const ReconstructionParameters& parameters) {
   ReconstructionParameters of = parameters;
   of.walls.clear();
+  of.box.reset();  // Wall particles have images in its place.
   of.fill = Fill::kNone;
   of.min_component_area = 0;
   of.min_component_particles = 0;
