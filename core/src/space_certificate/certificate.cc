@@ -90,7 +90,23 @@ bool HasMovedAround(const BrickDirectory& bricks, std::uint32_t brick,
   });
 }
 
-/// Sets the vertices of refused faces back, and counts a setback for their nodes (moved_nodes.h).
+/// Marks the vertices of a refused face. If all of them are at their anchors, marks its nodes.
+/// Thread-safe.
+void MarkRefused(const Face& face, const std::vector<Vec3>& anchors,
+                 const std::vector<Vec3>& positions, FaceChecker& checker,
+                 std::vector<std::uint8_t>& is_bad) {
+  const auto is_vertex = [&](std::uint32_t item) { return item < positions.size(); };
+  bool has_moved = false;
+  checker.ForEachItem(face, [&](std::uint32_t item) {
+    has_moved = has_moved || (is_vertex(item) && positions[item] != anchors[item]);
+  });
+  checker.ForEachItem(face, [&](std::uint32_t item) {
+    if (is_vertex(item) != has_moved) return;
+    std::atomic_ref(is_bad[item]).store(1, std::memory_order_relaxed);
+  });
+}
+
+/// Sets the marked vertices back, and counts a setback for the marked nodes (moved_nodes.h).
 /// Returns false if all these vertices are at their anchors, and all these nodes have had
 /// kMostSetbacks.
 bool MoveBack(const BrickDirectory& bricks, const SpaceCrossings& crossings,
@@ -212,9 +228,7 @@ bool CertifyMoved(const BrickDirectory& bricks, const SpaceCrossings& crossings,
                     // The face is tested again even if nothing moves.
                     Mark(bricks, brick, face.low.at, certificate.moved);
                     Mark(bricks, brick, face.high.at, certificate.moved);
-                    checker.ForEachItem(face, [&](std::uint32_t item) {
-                      std::atomic_ref(certificate.is_bad[item]).store(1, std::memory_order_relaxed);
-                    });
+                    MarkRefused(face, anchors, positions, checker, certificate.is_bad);
                   });
     });
     if (!is_refused) break;

@@ -43,7 +43,7 @@ struct Certificate {
 
   MovedNodes nodes;
   std::vector<std::uint8_t> setbacks;  ///< By vertex: how often it was set back (moved_nodes.h).
-  std::vector<std::uint8_t> is_bad;    ///< By vertex, then by node: it is part of a refused face.
+  std::vector<std::uint8_t> is_bad;    ///< By vertex, then by node: it is to be set back.
   /// Cells by brick. `moved`: with a vertex or node that moved, or with a refused face. `changed`:
   /// also cells with a node that followed vertices. A round tests the faces of changed cells.
   std::vector<BrickBits> moved, changed;

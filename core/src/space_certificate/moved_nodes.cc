@@ -113,8 +113,7 @@ BrickBits MoveNodesOf(std::uint32_t brick, const BrickBits& which, const BrickDi
       }
     }
     double share = nodes.setbacks[index] < kMostSetbacks ? 1 : 0;
-    for (int setback = kSmoothings; setback < nodes.setbacks[index]; ++setback)
-      share *= kKeptOfMove;
+    for (int setback = 0; setback < nodes.setbacks[index]; ++setback) share *= kKeptOfMove;
     const Vec3 move = total > 0 ? (share / total) * sum : Vec3{};
     if (move == nodes.moves[index]) return;
     nodes.moves[index] = move;

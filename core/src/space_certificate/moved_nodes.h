@@ -43,11 +43,15 @@ struct MovedNodes {
   }
 };
 
-/// Each round sets the vertices and nodes of refused faces back. The first kSmoothings setbacks of
-/// a vertex replace its displacement by the mean move of the nodes around it. This makes an uneven
-/// face even, but keeps the common displacement. Each later setback keeps kKeptOfMove of the
-/// displacement, and setback number kMostSetbacks keeps nothing. The first kSmoothings setbacks of
-/// a node change nothing; later ones are as for vertices.
+/// Each round sets the vertices of refused faces back. The first kSmoothings setbacks of a vertex
+/// replace its displacement by the mean move of the nodes around it. This makes an uneven face
+/// even, but keeps the common displacement. Each later setback keeps kKeptOfMove of the
+/// displacement, and setback number kMostSetbacks keeps nothing.
+///
+/// Nodes of a refused face are set back only if all its vertices are at their anchors. Otherwise a
+/// node would stay behind vertices that keep their displacement, and the faces beside it would be
+/// refused in turn: whole patches of vertices would return. Each setback of a node keeps
+/// kKeptOfMove of its move, and setback number kMostSetbacks keeps nothing.
 inline constexpr int kSmoothings = 4;
 inline constexpr int kMostSetbacks = 12;
 inline constexpr double kKeptOfMove = .7;
