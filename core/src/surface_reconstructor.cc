@@ -110,6 +110,7 @@ SurfaceStatistics FindCleanBodies(const LiftedFrame& lifted, const CopiedBox& co
   // With copies, also drops bodies without particles: ChooseImages cannot recognise their images.
   const space::DroppedBodies dropped =
       space::DropBodies({.drops_empty = is_cleaned || copied.any,
+                         .drops_gone = parameters.placement != SurfacePlacement::kVirtualPlane,
                          .least_volume = parameters.min_component_volume * h * h * h,
                          .least_particles = parameters.min_component_particles},
                         b.cleaning, b.bodies, b.field);
@@ -148,7 +149,7 @@ void AddBodies(const Frame& frame, std::size_t particles, double usual,
   std::uint64_t in_bodies = 0;
   for (std::uint32_t index = 0; index < bodies.bodies.size(); ++index) {
     const space::Body& body = bodies.bodies[index];
-    if (body.first_image != index) continue;
+    if (body.first_image != index || bodies.IsGone(index)) continue;
     in_bodies += body.particles;
     size.samples += std::min<std::uint64_t>(body.particles, kMaxSamples);
   }
@@ -404,7 +405,10 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                                   b.normals);
       const bool are_replaced =
           space::ReplaceDrops(drops, limits, b.drops, b.positions, b.normals, b.mesh.triangles);
-      if (are_replaced) return placed;
+      if (are_replaced) {
+        if (copied.any) space::RemoveGoneImages(body_of, b.bodies, b.mesh.triangles);
+        return placed;
+      }
       // A settled body has no ellipsoid, and its surface has not been placed: none is settled now.
       b.drops.is_settled.clear();
     }

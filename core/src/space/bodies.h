@@ -20,7 +20,9 @@ namespace partiemc::space {
 enum class BodyFate : std::uint8_t {
   kWhole,  ///< All of it.
   kCut,    ///< The part in the periodic box.
-  kGone,   ///< None, because another image of the same body remains.
+  /// None, because another image of the same body remains. The vertices of the image are placed,
+  /// so that the surfaces around all images move alike.
+  kGone,
 };
 
 struct Body {
@@ -31,8 +33,8 @@ struct Body {
   double volume = 0;            ///< Volume of `particles`, world units cubed.
   BodyFate fate = BodyFate::kWhole;
   bool is_complete = false;  ///< A cut body that lacks no part. Only in a box that wraps.
-  /// For a cut or dropped image: the smallest index among all images of the body. Else its own
-  /// index. ChooseImages gives all images the particles and the volume of the whole body.
+  /// For a cut image: the smallest index among all images of the body. Else its own index, from
+  /// DropBodies on. ChooseImages gives all images the particles and the volume of the whole body.
   std::uint32_t first_image = kNoIndex;
 };
 
@@ -57,6 +59,7 @@ struct Bodies {
   std::vector<std::uint32_t> body_of_particle;
 
   bool IsCut(std::uint32_t body) const { return bodies[body].fate == BodyFate::kCut; }
+  bool IsGone(std::uint32_t body) const { return bodies[body].fate == BodyFate::kGone; }
 
   /// The body of an inside node.
   std::uint32_t BodyOf(const BrickPlace& node) const {

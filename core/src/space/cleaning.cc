@@ -96,18 +96,21 @@ DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bod
   for (std::size_t index = 0; index < bodies.bodies.size(); ++index) {
     const Body& body = bodies.bodies[index];
     const bool has_images = body.copies > 0 || body.has_mirrors;
-    const bool is_gone = body.fate == BodyFate::kGone || (body.particles == 0 && has_images);
+    const bool is_gone = body.fate == BodyFate::kGone;
+    const bool has_only_images = body.particles == 0 && has_images;
     const bool is_empty = limits.drops_empty && body.particles == 0;
     const bool is_spray =
         body.volume < limits.least_volume || body.particles < limits.least_particles;
-    const bool counts = !is_gone && body.first_image == index;
+    const bool counts = !is_gone && !has_only_images && body.first_image == index;
     dropped.empty += is_empty && counts;
     dropped.spray += is_spray && !is_empty && counts;
-    const bool is_dropped = is_gone || is_empty || is_spray;
+    const bool is_dropped =
+        (is_gone && limits.drops_gone) || has_only_images || is_empty || is_spray;
     scratch.new_index[index] = is_dropped ? kNoIndex : kept;
     if (is_dropped) continue;
+    const std::uint32_t first = is_gone ? kept : scratch.new_index[body.first_image];
     bodies.bodies[kept] = body;
-    bodies.bodies[kept++].first_image = scratch.new_index[body.first_image];
+    bodies.bodies[kept++].first_image = first;
   }
   if (kept == bodies.bodies.size()) return dropped;
   bodies.bodies.resize(kept);

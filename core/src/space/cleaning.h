@@ -29,6 +29,7 @@ std::uint64_t FillCavities(const BrickDirectory& bricks, std::size_t most_nodes,
 
 struct BodyLimits {
   bool drops_empty = false;  ///< Drops bodies without particles.
+  bool drops_gone = true;    ///< Drops bodies with the fate kGone.
   double least_volume = 0;   ///< Least Body::volume of a body that stays.
   std::uint64_t least_particles = 0;
 };
@@ -38,8 +39,8 @@ struct DroppedBodies {
   std::uint64_t empty = 0, spray = 0;
 };
 
-/// Removes the bodies below the limits, bodies with the fate kGone, and bodies of images only, and
-/// makes their nodes outside. The result counts the bodies below the limits, several images of a
+/// Removes the bodies that `limits` requires, and bodies of images only, and makes their nodes
+/// outside. The result counts the bodies below the limits, several images of a
 /// body as one. The other bodies keep their order and particles. Particles of a body in a cavity do
 /// not count for the body around it.
 DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bodies& bodies,

@@ -55,7 +55,9 @@ void ListEdges(const ShellInput& input, NumberedShells& shells) {
         if (shell == kNoIndex) {
           const BrickPlace inside =
               begins_inside ? low : Normalise(bricks, brick, low.i + 1, low.j, low.k);
-          shell = shells.shell_of_body[input.bodies.BodyOf(inside)];
+          const std::uint32_t body = input.bodies.BodyOf(inside);
+          if (input.bodies.IsGone(body)) continue;
+          shell = shells.shell_of_body[body];
         }
         shells.edges.push_back({at.z * kBrickSize + k, at.y * kBrickSize + low.j,
                                 at.x * kBrickSize + low.i, shell, begins_inside});

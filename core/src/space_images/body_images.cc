@@ -158,6 +158,16 @@ void ChooseImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodi
   }
 }
 
+void RemoveGoneImages(std::span<const std::uint32_t> body_of_vertex, Bodies& bodies,
+                      std::vector<VertexTriangle>& triangles) {
+  std::erase_if(triangles, [&](const VertexTriangle& triangle) {
+    return triangle[0] < body_of_vertex.size() && bodies.IsGone(body_of_vertex[triangle[0]]);
+  });
+  for (std::uint32_t& body : bodies.body_of_particle) {
+    if (body != kNoIndex && body != kDroppedBody && bodies.IsGone(body)) body = kDroppedBody;
+  }
+}
+
 void FindCutShells(const Bodies& bodies, std::span<const std::uint32_t> body_of_shell,
                    const Surface& surface, CutShells& shells) {
   shells.any = false;

@@ -12,6 +12,7 @@
 #include "periodic/lift.h"
 #include "space/bins.h"
 #include "space/bodies.h"
+#include "space/mesh.h"
 
 namespace partiemc::space {
 
@@ -54,6 +55,11 @@ struct BodyImageScratch {
 /// wraps, copies without a body get kDroppedBody, too, if their particle or another copy has one.
 /// Requires: FindBodies. Deterministic. Cost: linear in particles and parts.
 void ChooseImages(const BodyImageInput& input, BodyImageScratch& scratch, Bodies& bodies);
+
+/// Removes the triangles and the particles (kDroppedBody) of bodies with the fate kGone.
+/// `body_of_vertex`: by vertex of SpaceCrossings; triangles of ellipsoids have further vertices.
+void RemoveGoneImages(std::span<const std::uint32_t> body_of_vertex, Bodies& bodies,
+                      std::vector<VertexTriangle>& triangles);
 
 /// The shells of the bodies that are cut.
 struct CutShells {

@@ -401,7 +401,7 @@ void ForEachTriangleOf(const DropsInput& input, std::span<const Vec3> positions,
   }
 }
 
-/// Replaces the surfaces of the drops that are taken.
+/// Replaces the surfaces of the drops that are taken. Those of gone images get no ellipsoids.
 void TakeDrops(const DropsInput& input, Drops& drops, std::vector<Vec3>& positions,
                std::vector<Vec3>& normals, std::vector<VertexTriangle>& triangles) {
   std::erase_if(triangles, [&](const VertexTriangle& triangle) {
@@ -414,6 +414,7 @@ void TakeDrops(const DropsInput& input, Drops& drops, std::vector<Vec3>& positio
       ThrowIfCancelled();
       until_check = kItemsPerCheck;
     }
+    if (drop.body != kNoIndex && input.bodies.IsGone(drop.body)) drop.is_taken = false;
     if (!drop.is_taken) continue;
     const Polyhedron& of = PolyhedronFor(RadiusOf(drop.volume) / input.scale.spacing);
     drop.first_vertex = static_cast<std::uint32_t>(positions.size());

@@ -425,6 +425,23 @@ TEST(SurfacePercolation, BitsDependNeitherOnThreadsNorOnOrder) {
   }
 }
 
+// A drop at a face, almost in contact with a rough layer, is whole at this face only. The layer
+// must not differ from its image at the opposite face. In the first of these frames, a cell has a
+// loop of the drop and a loop of the layer.
+TEST(SurfacePercolation, DropAtOneFaceKeepsOppositeFacesEqual) {
+  const PeriodicBox box = BoxOf(14, 12, 0);
+  for (std::uint64_t seed = 29; seed < 33; ++seed) {
+    Random random(seed);
+    SpaceParticles all = Filled(14, 12, 5, .3, random,
+                                [&](const Vec3& at) { return random.Chance(at.z > 4 ? .7 : 1); });
+    const double gap = random.Uniform(1, 2);
+    all.Add(support::Ball({7, .5, 7.3 + gap}, 2.3, .3, random));
+    const Surface surface = InBox(Wrapped(all, box), box);
+    EXPECT_LT(Mismatch(surface, box, 0), 1e-4);
+    EXPECT_LT(Mismatch(surface, box, 1), 1e-4) << "seed " << seed;
+  }
+}
+
 // At a face, half of the particles around a point are copies.
 TEST(SurfacePercolation, AttributesContinueAcrossTheFaces) {
   Random random(11);
