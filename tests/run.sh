@@ -219,16 +219,21 @@ step_viewer() {
 
 # Core, server and relay, then the client's background work. Step fuzz uses the same build, so only
 # these and the fuzz targets are compiled with sanitizers. Tests that count allocations are left out,
-# because they would count the sanitizer's. Because they are slow, left out are also those that only
-# compare figures of accuracy or sums with brute force, and of identities all but the frames that have
-# both ids and velocities. The step release runs all of them.
+# because they would count the sanitizer's. Left out because they are slow are those that compare
+# figures of accuracy, areas, volumes, jitter, costs or sums with brute force, those that follow bodies
+# for many frames, and of identities all but the frames that have both ids and velocities. The step
+# release runs all of them.
+readonly accuracy='Accuracy|contourpy|EqualsBruteForce|NoiseFigures|JitterOf|DoesNotLag|FewTriangles'
+readonly measures='AreaOf|AreasOf|ItsVolume|TheirVolume|NotCutGrains|SizesCost'
+readonly many_frames='TurmoilOf|Breathing|WrappedBodies|DriftingLayer|WhileTheyCross'
+readonly less_known='^With/.*/\(?(Nothing|Ids|Velocities)( |,|$)'
 step_sanitized() {
   check "sanitized: configure" cmake --preset asan || return
   local room
   for room in core server relay; do
     check "sanitized: build $room" cmake --build build/asan -j "$jobs" --target "tests/$room/all" &&
       run_ctest "sanitized $room" "build/asan/tests/$room" -LE allocation \
-        -E '(Space|Sizes|Walls|Phases)Accuracy|contourpy|EqualsBruteForce|^With/.*/\(?(Nothing|Ids|Velocities)( |,|$)'
+        -E "$accuracy|$measures|$many_frames|$less_known"
   done
   check "sanitized: build client and web" cmake --build build/asan -j "$jobs" \
     --target partiemc_sanitized_tests &&

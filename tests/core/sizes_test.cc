@@ -19,6 +19,7 @@
 #include "support/ring_stream.h"
 #include "support/sized_scenes.h"
 #include "support/stages.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -198,7 +199,7 @@ TEST(Sizes, OwnSizesThatAreEqualGiveTheOutlineOfEqualSizes) {
 }
 
 TEST(Sizes, ResultsKeepTheGuaranteesInRandomFrames) {
-  for (std::uint64_t seed = 1; seed <= 1'000; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(1'000u); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     Random random(seed);
     ReconstructionParameters parameters = kOwn;

@@ -246,7 +246,7 @@ TEST(Walls, LinesAndCornersOnTheLatticeAreExact) {
 TEST(Walls, CornersOfTurnedPolygonsAreVertices) {
   Random random(71);
   int missed = 0;
-  for (int tank = 0; tank < 300; ++tank) {
+  for (int tank = 0; tank < support::Tries(300); ++tank) {
     SCOPED_TRACE(tank);
     const int corners = 4 + tank % 4;
     const double x = random.Uniform(-9, 9), y = random.Uniform(-9, 9);

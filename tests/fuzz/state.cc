@@ -41,6 +41,12 @@ std::optional<AnyState> Parsed(const absl::StatusOr<AnyState>& state) {
 
 std::optional<State> Parse(std::string_view bytes) { return Parsed(ParseState(bytes)); }
 
+// Whether some frames more give a state that ParseState accepts: at most 2^62 identities. Only a
+// hostile state has as many.
+bool HasIdentitiesLeft(const auto& state) {
+  return state.history.identities_given < std::uint64_t{1} << 61;
+}
+
 // Two frames of a drop and of its halves after a state.
 void ContinueSurfaces(SurfaceState state) {
   static const auto reconstructor = SurfaceReconstructor::Create({});
@@ -67,7 +73,7 @@ void ContinueSurfaces(SurfaceState state) {
 void AttackSurfaceState(std::string_view bytes) {
   Parsed(ParseSurfaceState(bytes));
   const auto state = Parsed(ParseSurfaceState(PutRight(bytes, SurfaceState{})));
-  if (state && state->history.identities_given < std::uint64_t{1} << 61) ContinueSurfaces(*state);
+  if (state && HasIdentitiesLeft(*state)) ContinueSurfaces(*state);
 }
 
 }  // namespace
@@ -87,6 +93,7 @@ void AttackState(Bytes bytes) {
   const std::string right = PutRight(rest, State{});
   if (const auto state = Parse(right)) {
     Require(Parse(Serialize(*state)).has_value(), "a state that was accepted is accepted again");
+    if (!HasIdentitiesLeft(*state)) return;
     Choices of_frames(Bytes(reinterpret_cast<const std::uint8_t*>(frames.data()), frames.size()));
     AttackStream(of_frames, parameters, *state, 2);
   }

@@ -24,8 +24,9 @@
 
 namespace partiemc {
 
-inline constexpr std::uint64_t kAbsent = 0x7ff8000000000000;             // Not a number.
-inline constexpr std::uint64_t kMaxIdentities = std::uint64_t{1} << 62;  // No stream reaches it.
+inline constexpr std::uint64_t kAbsent = 0x7ff8000000000000;  // Not a number.
+/// The most in a state. A stream from a forged state can exceed it; its next state is then refused.
+inline constexpr std::uint64_t kMaxIdentities = std::uint64_t{1} << 62;
 inline constexpr std::size_t kChecksumBytes = 8;
 inline constexpr char kAsWritten[] = "must be what Serialize wrote";
 

@@ -316,7 +316,7 @@ std::pair<std::vector<std::uint64_t>, std::vector<std::uint64_t>> WholeBodies(st
 // The level set is wrong near the ends of the copies. Drops must not become part of the layer
 // there.
 TEST(SurfacePercolation, BodiesAreWholeWhereverTheFacesAre) {
-  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(60u); ++seed) {
     const auto [here, there] = WholeBodies(seed);
     EXPECT_EQ(here, there) << "seed " << seed;
   }
