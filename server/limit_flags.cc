@@ -11,9 +11,9 @@ namespace {
 // times this value and must fit into an int.
 constexpr std::uint64_t kMaxFrameBytes = std::numeric_limits<std::int32_t>::max() / 5 * 4;
 
-// By default a frame may have at most 1/kFramesInBudget of the memory budget, because it is in
-// memory before it is counted. With a very small budget it may have kLeastFrameBytes; then streams
-// progress one frame at a time.
+// The default of --max-frame-bytes is at most 1/kFramesInBudget of the memory budget, because a
+// frame is in memory before the budget counts it. It may be kLeastFrameBytes even if the budget is
+// very small; then streams progress one frame at a time.
 constexpr std::uint64_t kFramesInBudget = 8;
 constexpr std::uint64_t kLeastFrameBytes = 4 << 20;
 

@@ -12,7 +12,8 @@
 
 namespace partiemc::client {
 
-/// The attribute that --phases names, or a --wall of particles. Empty without such a flag.
+/// The name of the attribute that selects particles: from --phases, else from the first --wall that
+/// is an outline of particles. Empty without such a flag.
 std::string PhaseAttributeOf(const ReplayFlags& flags);
 
 /// Whether the caller must estimate the spacing before the stream opens, because surfaces and

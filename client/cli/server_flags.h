@@ -22,7 +22,7 @@ struct ServerFlags {
 
 /// Adds --server, --tls, --tls-ca, --tls-cert, --tls-key and --token-file. Returns --server.
 /// Requires: `flags` outlives the parsing. No flag holds the token itself, because every user of
-/// the machine can read a command line. PARTIEMC_TOKEN holds it.
+/// the machine can read a command line. The environment variable PARTIEMC_TOKEN holds it.
 CLI::Option* AddServerFlags(CLI::App& app, ServerFlags& flags, const std::string& group);
 
 /// Adds --coordinates: float64, float32 or compact.

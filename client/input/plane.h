@@ -1,4 +1,4 @@
-// Finds the plane of a 2D simulation whose recording has three coordinates.
+// Drops the constant coordinate of a 2D simulation whose recording has three coordinates.
 #pragma once
 
 #include <array>
@@ -17,8 +17,8 @@
 
 namespace partiemc::client::input {
 
-/// Projects the rows of a sequence's frames into the plane of its first particles, or keeps all
-/// three coordinates.
+/// Converts the rows of each frame of a sequence to a RecordedFrame. In 2D, drops the coordinate
+/// that is constant in the first frame with particles. With `in_space`, keeps all coordinates.
 class PlaneProjection {
  public:
   /// `keeps_volumes`: volumes that are not positive and finite stay in the frame.

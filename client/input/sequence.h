@@ -27,8 +27,8 @@ struct RecordedFrame {
   /// the interval between frames.
   std::optional<double> step;
   std::string source;  ///< File and frame number, for messages.
-  /// The box of the simulation, along the axes of `positions`; of LAMMPS dumps, extended xyz and
-  /// recordings.
+  /// The box of the simulation, along the axes of `positions`. Absent in all formats except LAMMPS
+  /// dumps, extended xyz and recordings.
   std::optional<RecordedBox> box;
   int components = 2;  ///< 3 with SequenceOptions::in_space.
   /// x, y (, z) interleaved, world units; NaN and infinity as recorded. If a file with three

@@ -46,8 +46,8 @@ std::optional<std::size_t> AxisOf(std::string_view name) {
   return axis;
 }
 
-// Removes the argument `slice`: an axis and a coordinate such as ("z", 0.5), or a point and a
-// normal.
+// Takes `slice` out of `arguments` and sets `slice`, or leaves it unchanged without this argument.
+// The argument is an axis and a coordinate, such as ("z", 0.5), or a point and a normal.
 void TakeSlice(Arguments& arguments, std::optional<SlicePlane>& slice) {
   const auto given = arguments.Take<py::object>("slice");
   if (!given) return;

@@ -37,7 +37,7 @@ struct VirtualPlaneSteps {
 struct VirtualPlaneConstants {
   // 1. Roots.
   double newton_step = 0.3;  ///< Longest Newton step, in cells.
-  double long_step = 0.07;   ///< After a longer step the gradient is evaluated again, in cells.
+  double long_step = 0.07;   ///< In cells. After a longer step the gradient is evaluated again.
   // 2. Normals.
   double normal_reach = 3;     ///< Window of the mean by distance along the ring.
   double bilateral_reach = 6;  ///< Window of the mean by distance and angle.
@@ -82,7 +82,7 @@ struct NamedConstant {
   double VirtualPlaneConstants::*value;
 };
 
-/// All steps and all constants, in their order.
+/// All steps and all constants, in the order of the members.
 std::span<const NamedStep> AllSteps();
 std::span<const NamedConstant> AllConstants();
 

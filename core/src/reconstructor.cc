@@ -50,7 +50,7 @@ void Prepare(std::span<const Attribute> attributes, const ReconstructionParamete
   const bool is_surface = parameters.output == Output::kSurface;
   const std::size_t sections = parameters.sections.size();
   result.Clear();
-  // The result may have had a surface before. An outline has no names of attributes of a surface.
+  // Clear keeps the names of attributes. Removes the names that an earlier surface has left.
   if (!is_surface) result.surface.attributes.clear();
   Name(is_surface ? std::span<const Attribute>() : attributes, result.attributes);
   result.sections.resize(sections);

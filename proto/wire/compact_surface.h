@@ -16,10 +16,11 @@ namespace partiemc::wire {
 absl::Status EncodeCompact(const Surface& surface, const Origin& origin, double spacing,
                            bool has_normals, v1::Surface& message);
 
-/// Reads the fields that EncodeCompact writes, except cuts. Requires: `surface` has the offsets of
-/// `message`, checked. Does not check the indices of triangles. Errors: DATA_LOSS for an invalid
-/// `step`, arrays that do not decompress, coordinates that are not finite, normals of length 0, and
-/// attributes without 1 to 3 components. Allocates no array that its bytes could not fill.
+/// Reads the fields that EncodeCompact writes, except cuts. Requires: the caller has copied the
+/// offsets of `message` to `surface` and has checked them. Does not check the indices of triangles.
+/// Errors: DATA_LOSS for an invalid `step`, arrays that do not decompress, coordinates that are not
+/// finite, normals of length 0, and attributes without 1 to 3 components. Allocates no array that
+/// its bytes could not fill.
 absl::Status DecodeCompact(const v1::Surface& message, const Origin& origin, Surface& surface);
 
 }  // namespace partiemc::wire

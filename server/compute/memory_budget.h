@@ -133,8 +133,9 @@ class MemoryBudget {
   // bytes if `beyond` fewer bytes were permitted beyond the budget.
   bool FitsWithout(std::uint64_t beyond, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
-  // Returns an error if the held and planned bytes of the caller exceed its quota, or if those of
-  // all callers exceed the budget. `bytes` are already counted; only the error's text uses them.
+  // Returns an error if the held and planned bytes of the caller exceed its quota, or if the held
+  // and planned bytes of all callers exceed the budget. `bytes` are already counted; only the
+  // error's text uses them.
   absl::Status CheckHeld(std::uint64_t bytes, const CallerAccount* caller) const
       ABSL_LOCKS_EXCLUDED(mutex_);
   std::uint64_t PlannedBy(const CallerAccount* caller) const ABSL_LOCKS_EXCLUDED(mutex_);

@@ -24,7 +24,7 @@ class MemoryBudget;
 struct ReadTerms {
   /// Maximum number of streams with a frame beyond the budget at the same time, at least 1.
   std::uint32_t streams_beyond = 2;
-  /// Size of the largest message, at least 1.
+  /// Size of the largest message in bytes, at least 1.
   std::uint64_t message_bytes = 1;
 };
 

@@ -25,7 +25,8 @@ class FinishedStreams {
   /// Adds a stream whose last result had the sequence number `last_sequence`; 0: it had no result.
   /// Drops the oldest streams if there is no room. Does not add a description above kMostBytes.
   void Add(relay::v1::LiveStream stream, std::uint64_t last_sequence) ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Removes the streams of this lineage: one of them was resumed, and has not finished again.
+  /// Removes the streams of this lineage. Called when a stream of the lineage ends without having
+  /// finished: if it had resumed a finished stream, that entry is outdated.
   void Forget(std::string_view lineage) ABSL_LOCKS_EXCLUDED(mutex_);
   /// Returns the stream of this name and lineage, if it finished during the last 30 s. Its summary
   /// contains the sequence number of its last result. Returns nothing for an empty lineage.

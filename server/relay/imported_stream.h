@@ -49,9 +49,9 @@ class ImportedStream {
   /// ended or had no watcher for kLinger.
   bool IsIdle(TimePoint now) const;
 
-  /// Whether a watcher that starts at `from_sequence` (absent: at the newest result) receives the
-  /// same results from this import as from another import. Always true if `limits` has no history;
-  /// false after the end of the stream.
+  /// Whether this import suffices for a watcher that starts at `from_sequence` (absent: at the
+  /// newest result): a second import could not supply earlier results. False after the end of the
+  /// stream. Before the end, true if `limits` has no history.
   bool Covers(std::optional<std::uint64_t> from_sequence, TimePoint now) const;
   /// Calls `ready`, at once or later.
   void Await(Ready ready);

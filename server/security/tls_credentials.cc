@@ -43,8 +43,8 @@ class TlsCredentials final : public grpc::ServerCredentials {
     if (version.number == credentials.fetched_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
     const TlsIdentity& identity = *version.identity;
     const grpc_ssl_pem_key_cert_pair pair{identity.key.c_str(), identity.certificate.c_str()};
-    // gRPC requires a client authority even if no client certificate is required; the server's own
-    // certificate then takes its place.
+    // gRPC requires a client authority even if no client certificate is required. In this case it
+    // receives the server's own certificate.
     const std::string& authority =
         identity.client_ca.empty() ? identity.certificate : identity.client_ca;
     *config = grpc_ssl_server_certificate_config_create(authority.c_str(), &pair, 1);

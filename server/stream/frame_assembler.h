@@ -56,9 +56,9 @@ class FrameAssembler {
 
   struct Terms {
     std::uint32_t parts = 1;
-    std::size_t window = 1;                ///< Frames assembled at once, from the next answer on.
+    std::size_t window = 1;                ///< Maximum number of frames assembled at once.
     std::uint64_t max_frame_bytes = 0;     ///< Limit of parts 1 and above of a frame together.
-    std::chrono::milliseconds timeout{0};  ///< Time for all parts of a frame, from the first on.
+    std::chrono::milliseconds timeout{0};  ///< From the first part of a frame to the last.
     bool has_checkpoints = false;          ///< Responses may have checkpoints.
     std::uint64_t next_sequence = 1;       ///< Number of the first frame.
   };
@@ -93,7 +93,8 @@ class FrameAssembler {
   /// the last response contained a checkpoint.
   /// Requires: `next_sequence` never decreases.
   void Answered(std::uint64_t next_sequence, bool with_checkpoint);
-  /// Calls LookAgain of the calls of parts 1 and above. Called after Answered.
+  /// Calls LookAgain for each call of the parts 1 and above. The call of part 0 calls this after
+  /// Answered, once the write of its response has started or was queued.
   void TellMembers();
   /// The call of part 0 ends, so no further frame gets a response. Removes the other calls: with OK
   /// if `status` is OK, otherwise with UNAVAILABLE (LEADER_GONE).

@@ -92,8 +92,8 @@ struct ServerLimits {
   /// The budget without the histories.
   std::uint64_t FrameBudget() const { return memory_budget - AllHistoryBytes(); }
 
-  /// The part of the memory for states that each stream has for itself. Ordinary states are
-  /// smaller.
+  /// Memory that is reserved for the state of each stream. Ordinary states are smaller. Larger
+  /// states also use SharedStateBytes.
   static constexpr std::uint64_t kOwnStateBytes = 64 << 10;
   /// Maximum size of the states of all streams between their frames, outside of the budget: a
   /// quarter of it, but at least kOwnStateBytes for each stream.

@@ -30,7 +30,8 @@ void RefuseTraces();
 /// Installs a handler that flushes the log if the process aborts (an assertion, std::terminate).
 void FlushLogOnAbort();
 
-/// Logs the losses since the last log of them. Waits at most `patience` until all is written.
+/// Logs the losses (LogLosses) since they were last logged. Then waits at most `patience` until all
+/// lines are written.
 void FlushLog(std::chrono::milliseconds patience = std::chrono::milliseconds(500));
 
 /// Losses since the start: lines that were dropped because standard error was too slow, and
@@ -56,8 +57,8 @@ void LogEvent(spdlog::level::level_enum level, std::string_view event,
               std::initializer_list<LogField> fields);
 
 /// Logs a refused caller or request with its reason. `client`: the name of the caller; empty if it
-/// is unknown. Writes at most twenty lines per second; then
-/// writes one line with the number of refusals that were not logged.
+/// is unknown. Writes at most twenty lines per second; then writes one line with the number of
+/// refusals that were not logged.
 void LogRefusal(std::string_view event, const std::string& peer, const absl::Status& status,
                 const std::string& client = {});
 

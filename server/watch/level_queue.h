@@ -57,7 +57,7 @@ class LevelQueue final : public Dispatched {
     std::size_t kept_bytes = std::size_t{32} << 20;
   };
 
-  /// A watcher that waits for a frame.
+  /// A watcher that has requested a level of a frame.
   class Waiter {
    public:
     virtual ~Waiter() = default;
@@ -113,8 +113,8 @@ class LevelQueue final : public Dispatched {
   /// or is about to begin.
   bool Withdraw(const Waiter& waiter) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  /// Cancels the running level and ends the thread. Requests in the queue get no LevelDone. Those
-  /// of the running level and of finished levels may get it after Stop.
+  /// Cancels the running level and ends the thread. Requests in the queue get no LevelDone.
+  /// Requests of the running level and of finished levels may get it after Stop.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
   /// `computed`: number of levels that were computed. `shared`: number of requests that needed no
@@ -144,7 +144,7 @@ class LevelQueue final : public Dispatched {
     std::deque<Job> jobs;  // The group is in ready_ if there are any.
   };
   struct Running {
-    Group* group = nullptr;  // Null once its last watcher has left.
+    Group* group = nullptr;  // The group of `job`; null once the group has no watcher.
     Job job;
   };
   struct Kept {

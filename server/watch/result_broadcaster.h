@@ -51,8 +51,9 @@ class ResultBroadcaster final : public Dispatched, public HistoryOwner {
   /// caller must call Announce. Requires: `sequence` increases from call to call.
   [[nodiscard]] bool Publish(std::shared_ptr<const WatchFrame> frame, std::uint64_t sequence)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  /// Publishes and announces a result of a stream that another server owns, under that server's
-  /// result number. Requires: numbers increase; a skipped number never follows later.
+  /// Publishes and announces a result of a stream that another server owns. `published` has the
+  /// result number of that server. Requires: the numbers increase from call to call. Some may be
+  /// missing, because the bus may lose results.
   void PublishNumbered(Published published);
   /// Sets the oldest sequence number in the history of the server that owns the stream. 0: it has
   /// no history.

@@ -10,7 +10,7 @@
 namespace partiemc::server {
 namespace {
 
-// The rule for a watcher of an ended stream.
+// The rule in the Violation for a watcher of an ended stream that pauses too long.
 constexpr char kPausedRule[] =
     "must give credit and accept results within this time, once the stream has ended";
 
@@ -170,8 +170,8 @@ bool WatchStateMachine::IsHeld(std::uint64_t number) const {
   return broadcaster_->Held(number).number == number;
 }
 
-// If the history contains all pending frames, drops them; the watcher will read them from the
-// history later. Returns whether it does.
+// If the history contains all pending frames and the new frame `published`, drops the pending
+// frames and returns true. The watcher then reads all of them from the history.
 bool WatchStateMachine::LeaveToHistory(const Published& published) {
   const std::uint64_t first = pending_.empty() ? published.number : pending_.front().number;
   if (!IsHeld(first)) return false;

@@ -83,8 +83,9 @@ struct WatchCounts {
   std::size_t most_held_bytes = 0;  ///< Largest value of held_bytes().
 };
 
-/// The state machine of one watcher (phases: server/base/call_state.h). Ending owes the message
-/// `ended`, closing does not:
+/// The state machine of one watcher (phases: server/base/call_state.h). In the phase `ending` the
+/// message `ended` must still be sent. In the phase `closing` it is being written, or the watch was
+/// refused and gets only a status:
 ///
 ///   opening --open--> serving --stream ends, fell behind, drain--> ending --> closing --> finished
 ///      |                 |                                            |          |          ^

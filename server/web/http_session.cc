@@ -172,7 +172,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     piece_.resize(kFilePiece);
     const auto count = read(file_->file.descriptor(), piece_.data(),
                             std::min<std::uint64_t>(left_, piece_.size()));
-    if (count <= 0) return connection_->Close();  // The file has become shorter than announced.
+    // A read error, or the file has become shorter than announced.
+    if (count <= 0) return connection_->Close();
     left_ -= static_cast<std::uint64_t>(count);
     connection_->CloseAfter(kWebResponseTime);
     if (left_ == 0) file_.reset();

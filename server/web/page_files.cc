@@ -21,8 +21,8 @@ struct FoundFile {
   struct stat status {};
 };
 
-// Opens a file below `root`. Opens the folders of the path one by one, so that it follows no
-// symbolic link.
+// Opens the regular file `path` below `root`. Returns nothing if there is none. Opens the folders
+// of the path one by one, so that it follows no symbolic link below `root`.
 std::optional<FoundFile> OpenBelow(const std::string& root, const std::string& path) {
   OpenFile at(open(root.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
   if (at.descriptor() < 0) return std::nullopt;

@@ -17,8 +17,9 @@ struct Percentiles {
 /// Returns 0 for every percentile if `times` is empty. Sorts `times`.
 Percentiles PercentilesOf(std::vector<double>& times);
 
-/// Whether the medians of two windows of equal length agree, and their 99th percentiles: within 5 %
-/// of the larger one or within 0.2 ms. False if a window is empty.
+/// Whether two windows of equal length have similar latencies: both the medians and the 99th
+/// percentiles differ by at most 5 % of the larger one, or by at most 0.2 ms. False if a window is
+/// empty.
 bool HaveSettled(const Percentiles& before, const Percentiles& after);
 
 /// Collects times from many threads.

@@ -216,8 +216,8 @@ double MemoryMb() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-// Results of the run without its first window, in which buffers grow. Only `refused` and the memory
-// are of the whole run.
+// Results of the run without its first window, in which buffers grow. Exceptions: `refused` and the
+// memory cover the whole run.
 struct Figures {
   double seconds = 0;
   bool settled = false;

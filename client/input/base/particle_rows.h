@@ -40,10 +40,10 @@ struct ParticleRows {
   void Begin(const ColumnPlan& plan);
 };
 
-/// Adds one row of a text table if it fulfils the conditions of `request`. Requires:
-/// rows.Begin(plan). Errors: kDataLoss if cells are missing, surplus or not numbers, or above
-/// kMaxParticles rows. An invalid id is no error (has_ids). The message does not state the file and
-/// the line; the caller adds them.
+/// Adds one row of a text table if it fulfils the conditions of `request`; otherwise counts it in
+/// `rows.unselected`. Requires: rows.Begin(plan). Errors: kDataLoss if there are too few or too
+/// many cells, if a cell is no number, or above kMaxParticles rows. An invalid id is no error; it
+/// sets `rows.has_ids` to false. The caller adds the file and the line to the message.
 absl::Status AppendTextRow(std::span<const std::string_view> cells, const ColumnPlan& plan,
                            const ColumnRequest& request, ParticleRows& rows);
 
@@ -66,7 +66,7 @@ std::size_t ElementBytes(ElementType type);
 /// A column of a binary table: a view, elements `stride` bytes apart.
 struct ArrayColumn {
   ElementType type = ElementType::kFloat64;
-  bool swapped = false;  ///< Byte order other than this machine's.
+  bool swapped = false;  ///< Whether the byte order differs from this machine's.
   const char* data = nullptr;
   std::size_t stride = 0;
 

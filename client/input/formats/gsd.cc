@@ -40,7 +40,7 @@ struct GsdChunk {
 struct GsdContent {
   bool is_hoomd = false;  // Whether the file has the schema of HOOMD-blue.
   std::uint64_t frame_count = 0;
-  std::map<std::uint64_t, std::vector<GsdChunk>> frames;  // By index; without empty frames.
+  std::map<std::uint64_t, std::vector<GsdChunk>> frames;  // By index; only frames with chunks.
 };
 
 class GsdIndex {

@@ -57,15 +57,17 @@ class Hdf5File {
   /// The description of a dataset. Empty if there is no dataset of numbers.
   std::optional<Hdf5Array> Describe(const std::string& dataset) const;
 
-  /// Checks that the numbers of a dataset are in this file, and that neither they nor one of their
-  /// chunks unpack to too much. Errors: kDataLoss, kUnimplemented.
+  /// Checks that the numbers of a dataset are in this file, and that neither the dataset nor a
+  /// chunk unpacks to more bytes than `max_expansion` of Open permits. Errors: kDataLoss,
+  /// kUnimplemented.
   absl::Status CheckStored(const std::string& dataset) const;
 
   /// Reads rows [begin, begin + count). Errors: kDataLoss if the file holds fewer; as CheckStored.
   absl::Status Read(const std::string& dataset, std::uint64_t begin, std::uint64_t count,
                     std::vector<char>& bytes) const;
 
-  /// The first number of an attribute of a group or dataset. Empty without such a number.
+  /// The first number of an attribute of a group or dataset. Empty if there is no such attribute,
+  /// or if it has no numbers or more than 64.
   std::optional<double> Attribute(const std::string& object, const std::string& name) const;
 
  private:

@@ -1,5 +1,5 @@
-// The particles of a legacy VTK file. VTK's own readers of POLYDATA and UNSTRUCTURED_GRID also
-// build the cells, trust their counts, and read out of bounds in a damaged file (VTK 9.1,
+// Reads the particles of a legacy VTK file. VTK's own readers of POLYDATA and UNSTRUCTURED_GRID
+// also build the cells, trust their counts, and read out of bounds in a damaged file (VTK 9.1,
 // vtkCellArray::AppendLegacyFormat). This reader skips the cells.
 #pragma once
 

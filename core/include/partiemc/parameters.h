@@ -49,7 +49,7 @@ enum class SpacingRule : std::uint8_t {
                 ///< one. The lattice of the first such frame stays.
 };
 
-/// The size h_i of a particle: the spacing that it needs between its neighbours and itself.
+/// How the size h_i of a particle is determined. The size replaces h for this particle.
 enum class Sizes : std::uint8_t {
   kEqual,  ///< The spacing h, for all particles.
   kOwn,    ///< h_i = sqrt(v_i), for surfaces cbrt(v_i), with v_i of Frame::volumes (core/SIZES.md).

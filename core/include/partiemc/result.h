@@ -103,7 +103,9 @@ struct FrameStatistics {
   std::uint64_t active_cells = 0;        ///< Cells that the outline crosses; 0 for surfaces.
   std::uint64_t dropped_holes = 0;       ///< Holes that cleaning closed; for surfaces, cavities.
   std::uint64_t dropped_components = 0;  ///< Components without a particle that cleaning removed.
-  std::uint64_t dropped_spray = 0;       ///< Components below the minimum size in the parameters.
+  /// Components that were removed because they are smaller than `min_component_area`,
+  /// `min_component_particles` or, for surfaces, `min_component_volume`.
+  std::uint64_t dropped_spray = 0;
   /// Bodies that were cut at faces of the periodic box, because they percolate or because they are
   /// long and near a body that does (core/PERIODIC.md).
   std::uint64_t cut_bodies = 0;

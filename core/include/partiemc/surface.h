@@ -28,9 +28,11 @@ struct ShellMeasures {
 struct SurfaceStatistics {
   std::uint64_t dropped_cavities = 0;    ///< Cavities that cleaning filled.
   std::uint64_t dropped_components = 0;  ///< Bodies without a particle that cleaning removed.
-  std::uint64_t dropped_spray = 0;       ///< Bodies below the minimum size in the parameters.
-  std::uint64_t bricks = 0;              ///< Bricks of 8 x 8 x 8 nodes that were allocated.
-  Doubts doubts;                         ///< Reasons to distrust the surface.
+  /// Bodies that were removed because they are smaller than `min_component_volume` or
+  /// `min_component_particles`.
+  std::uint64_t dropped_spray = 0;
+  std::uint64_t bricks = 0;  ///< Bricks of 8 x 8 x 8 nodes that were allocated.
+  Doubts doubts;             ///< Reasons to distrust the surface.
 
   friend bool operator==(const SurfaceStatistics&, const SurfaceStatistics&) = default;
 };

@@ -32,7 +32,8 @@ struct SurfaceParameters {
   /// As in ReconstructionParameters, with the same ranges.
   double kernel_radius = 3, cell_size = 1;
   Sizes sizes = Sizes::kEqual;
-  /// Reference radius in spacings. Absent: calibrated (core/SURFACES.md).
+  /// Reference radius of the level set in spacings, as in ReconstructionParameters. Absent: the
+  /// value of core/SURFACES.md, "Calibration".
   std::optional<double> reference_radius = std::nullopt;
 
   /// Fill cavities smaller than 2 h^3 and drop bodies without particles. Absent: on for

@@ -8,8 +8,8 @@ namespace partiemc {
 /// Thrown by the tasks of a cancelled frame. Reconstruct returns CANCELLED.
 struct Cancelled {};
 
-/// Sets the cancellation flag of this thread until the end of the scope; null removes it. Tasks
-/// inherit the flag of the thread that created them (parallel.h).
+/// Sets the cancellation flag of this thread; null: no flag. The end of the scope restores the
+/// previous flag. Tasks inherit the flag of the thread that created them (parallel.h).
 class CancellationScope {
  public:
   explicit CancellationScope(const std::atomic<bool>* flag) : outer_(current_) { current_ = flag; }

@@ -34,9 +34,10 @@ double TileMargin(const Scale& scale) {
 // Particles per block, few enough that the data of a block stay in the nearest cache.
 constexpr std::size_t kBlockParticles = 256;
 
-// A direct-mapped cache of tile indices, addressed by the low bits of tile coordinates. A body of
-// up to 256 x 256 tiles finds all its tiles in the cache, scattered tiles most of theirs, without
-// an unpredictable probe of the directory. Indices that do not fit into 16 bits are not cached.
+// A direct-mapped cache of tile indices, addressed by the low bits of tile coordinates. It avoids
+// unpredictable probes of the directory. A body of up to 256 x 256 tiles fits into the cache
+// completely; of scattered tiles, most are found in it. Indices that do not fit into 16 bits are
+// not cached.
 class RecentHomes {
  public:
   explicit RecentHomes(BinStretch& stretch) : stretch_(stretch) { index_.fill(kNone); }

@@ -15,7 +15,7 @@
 
 namespace partiemc {
 
-/// A uniform grid over the boxes of triangles.
+/// A uniform grid that finds the pairs of triangles in space whose boxes intersect.
 class TriangleGrid {
  public:
   TriangleGrid() = default;

@@ -73,7 +73,8 @@ void ForEachRun(const IdentityInput& input, IdentityScratch& s, const Visit& vis
   });
 }
 
-// Adds all runs of each body that will be cut but has no node in the window.
+// Numbers each body that will be cut but has no node in the box (Percolation::window), and adds all
+// runs of its outer rings.
 void AddBodiesBesideNodes(const IdentityInput& input, IdentityScratch& s,
                           std::vector<NodeRun>& runs) {
   const RingTopology& topology = input.topology;

@@ -25,7 +25,7 @@ constexpr std::uint64_t kTolerance = 6;
 constexpr std::uint64_t kAccountedQuarters = 3;
 
 // Estimates the nodes that a piece passed to another piece: its number of nodes, times the share of
-// its samples that are in the other piece.
+// its samples that are in the other piece; at most the nodes of the other piece.
 std::uint64_t NodesBySamples(const Relation& relation, const Evidence& s) {
   const std::uint64_t nodes = s.nodes_before[relation.before];
   const std::uint64_t count = s.sample_count[relation.before];

@@ -104,7 +104,8 @@ void ForEachChosen(const SampleInput& input, const RingSamples& s, Visit visit) 
   }
 }
 
-// The second pass: samples each ring with too few samples again, from all its particles.
+// The second pass: for each ring that got too few samples, selects its samples from all of its
+// particles.
 void FillShortRings(const SampleInput& input, RingSamples& s) {
   bool any = false;
   for (std::size_t ring = 0; ring < s.ring_limit.size(); ++ring) {

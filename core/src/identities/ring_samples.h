@@ -24,10 +24,11 @@ struct RingSamples {
   std::vector<std::uint32_t> first_sample, sample_count;  // By number.
   std::vector<std::uint32_t> bucket;                      // Of the HashIndex of the last samples.
   std::vector<std::uint64_t> known;                       // Bits of KnownHashes.
-  std::vector<std::uint64_t> ring_limit, tile_limit;  // Largest accepted hash by number, by tile.
+  // The largest accepted hash of an id: of a ring, by number; of a tile, by tile.
+  std::vector<std::uint64_t> ring_limit, tile_limit;
   struct Stretch {
     std::vector<std::uint64_t> home_limit;  // By tile of the stretch: largest accepted hash.
-    std::vector<std::uint32_t> chosen;      // Particles.
+    std::vector<std::uint32_t> chosen;      // Particles that the first pass does not skip.
   };
   std::vector<Stretch> stretches;  // By stretch of the bins.
 };
@@ -38,7 +39,7 @@ struct SampleInput {
   const Crossings& crossings;
   const Components& components;
   std::span<const std::uint32_t> ring_of_component;  ///< By component: number of its outer ring.
-  std::span<const std::uint64_t> particle_count;     ///< By number: particles that count.
+  std::span<const std::uint64_t> particle_count;     ///< By number: its particles (see Counts).
   const Percolation* percolation = nullptr;          ///< Null: the frame has no copies.
   ParticleSubset subset = {};
 

@@ -66,7 +66,7 @@ void ForEachBlock(const Blocks& blocks, Visit visit) {
     for (int level = 0; level < kBlockLevels; ++level) {
       const int side = 1 << level;
       for (int j = 0; j < kTileSize; j += side) {
-        // All rows of a block have the same bits.
+        // All rows of a block have the same bits, so its first row is enough.
         const std::uint32_t larger = level + 1 < kBlockLevels ? levels[level + 1][j] : 0;
         for (std::uint32_t row = levels[level][j] & ~larger; row != 0;) {
           const int i = std::countr_zero(row);

@@ -29,9 +29,9 @@ struct MeshScratch {
   LoopGroups loops;
   NodeVertices nodes;
   Blocks blocks;
-  std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: number of its node.
+  std::vector<std::uint32_t> corner_numbers;  // By corner of the staircases: its point in the mesh.
   std::vector<std::uint32_t> triangles;       // Of the interior cells.
-  std::vector<double> points;                 // Lattice nodes, while ring points are replaced.
+  std::vector<double> points;                 // Keeps the nodes while ring points are replaced.
 };
 
 /// Results of the earlier stages.

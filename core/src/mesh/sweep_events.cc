@@ -12,8 +12,8 @@ bool ComesFirst(const SweepEvent& a, const SweepEvent& b) {
   return SweepsBefore(a.point, b.point);
 }
 
-/// Divides the range of heights into equal buckets. Every operation rounds monotonically, so a
-/// higher point is never in a lower bucket.
+/// Divides the range of y into equal buckets. Every operation rounds monotonically, so a point with
+/// a larger y is never in a lower bucket.
 class Buckets {
  public:
   /// Requires: there are events.
@@ -72,7 +72,7 @@ bool SweepEvents::List(std::span<const double> points, std::span<const std::uint
   return true;
 }
 
-/// Bucket sort by height, with one bucket for each event on average; then sorts each bucket.
+/// Bucket sort by y, with as many buckets as events; then sorts each bucket.
 void SweepEvents::Sort() {
   const Buckets buckets(events_);
   ends_.assign(buckets.size() + 1, 0);

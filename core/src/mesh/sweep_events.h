@@ -21,9 +21,8 @@ class SweepEvents {
  public:
   /// Lists the points of the loops in the order of SweepsBefore; points at the same position are
   /// ordered by index. Parameters as for Triangulator::Triangulate. Returns false, without events,
-  /// if the parameters break the first requirement of Triangulate, except that neighbours may have
-  /// equal positions.
-  /// Cost: linear if heights are spread evenly, n log n if many points have similar heights.
+  /// if they break requirement 1 of Triangulate. Unlike there, neighbours may have equal positions.
+  /// Cost: linear if the values of y are spread evenly, n log n if many of them are similar.
   [[nodiscard]] bool Collect(std::span<const double> points,
                              std::span<const std::uint32_t> loop_points,
                              std::span<const std::uint32_t> loop_offsets);

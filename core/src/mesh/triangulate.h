@@ -87,7 +87,7 @@ class Triangulator {
     bool IsMerged() const { return !right_piece.IsEmpty(); }
   };
 
-  /// The intervals that a point touches, after the intervals that end in the point were closed.
+  /// The intervals next to a point. The intervals that end in the point are already closed.
   struct Surroundings {
     std::uint32_t left = kNoIndex;  // Directly left of the point.
     std::uint32_t right =

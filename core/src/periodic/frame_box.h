@@ -50,7 +50,8 @@ struct BoxMotion {
     return now + (position - before) * stretch;
   }
 
-  /// Moves a node, rounds to the nearest node and clamps to 32 bits. Requires: the unit is a cell.
+  /// Moves a node, rounds to the nearest node and clamps to 32 bits. Requires: MotionOf was called
+  /// with the cell size as `unit`.
   std::int32_t NodeAt(std::size_t axis, double node) const {
     constexpr double kMost = std::numeric_limits<std::int32_t>::max();
     const double at = std::floor(At(axis, node) + .5);
@@ -58,7 +59,7 @@ struct BoxMotion {
   }
 
   /// Moves the run of nodes [first, last] with its middle node; the length of the run stays.
-  /// Requires: the unit is a cell.
+  /// Requires: as NodeAt.
   void MoveRun(std::size_t axis, std::int32_t& first, std::int32_t& last) const {
     constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
     const std::int64_t nodes = std::int64_t{last} - first;

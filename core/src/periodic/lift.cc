@@ -273,7 +273,8 @@ void WritePositions(const Grid& grid, std::span<const Real> given, std::size_t c
   });
 }
 
-// Checks that no particle is too far away to be wrapped.
+// Checks that along periodic axes no coordinate is more than kMostLengths lengths of the box from
+// its origin. `names`: by particle, its number in errors; if empty, its index.
 template <typename Real>
 absl::Status CheckDistances(const Grid& grid, std::span<const Real> positions,
                             std::size_t components, std::span<const std::uint32_t> names) {

@@ -92,7 +92,7 @@ void MeasureBodies(const RingTopology& topology, BodyChoice& c) {
 }
 
 // Finds the image of each body that stays whole: the complete image with the most given particles.
-// There is none if this image lacks particles of the body.
+// There is none if this image does not have each particle of the body exactly once.
 void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();
   c.best.assign(components, kNoComponent);
@@ -106,7 +106,7 @@ void FindBest(const BodyChoiceInput& input, const RingTopology& topology, BodyCh
   for (std::uint32_t root = 0; root < components; ++root) {
     std::uint32_t& best = c.best[root];
     if (best == kNoComponent) continue;
-    // An image that has both a particle and its copy has more particles than the body.
+    // Fewer: particles are missing. More: the image has a particle and its copy.
     if (topology.particle_count[topology.outer_ring[best]] != c.total[root]) best = kNoComponent;
   }
 }

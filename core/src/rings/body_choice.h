@@ -54,8 +54,9 @@ struct BodyChoiceInput {
 /// - An image that lies in the window, widened by `reach`, is complete. Of the complete images, the
 ///   one with the most given particles stays whole; ties: the lowest component. The others go.
 /// - If no image is complete, the body percolates or is too long: all its images are cut.
-/// - If the chosen image lacks particles of the body, all images are cut, too. Bodies less than a
-///   cell apart may be one component in one image and two in another.
+/// - If the chosen image lacks particles of the body, or has a particle and its copy, all images
+///   are cut, too. Bodies less than a cell apart may be one component in one image and two in
+///   another.
 /// In `topology`, the images of cut bodies keep only their given particles, and spray is counted.
 /// Requires: TraceRings has kept the spray. Cost: linear in particles and segments.
 void ChooseBodies(const BodyChoiceInput& input, BodyChoice& choice, RingTopology& topology);

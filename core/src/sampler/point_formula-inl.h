@@ -77,7 +77,8 @@ class PointFormula {
     return gaps & ((std::uint64_t{1} << count) - 1);
   }
 
-  // The gradient of the gap term at a point, from its sums and third sums.
+  // The gradient of the gap term at point number `point`. `third`: the sums of ThirdChannel at this
+  // point.
   Point GapGradient(const Totals& totals, const double (&third)[kThirdSums],
                     std::size_t point) const {
     const auto sum = [&](int channel) { return totals[channel][point]; };

@@ -19,8 +19,11 @@ struct SimplifyLimits {
 inline constexpr double kFarthest = 2;
 
 struct SimplifyReport {
-  std::uint32_t repeated_shells = 0;   ///< Shells simplified again, and all certified_shells.
-  std::uint32_t certified_shells = 0;  ///< Shells that kept all their triangles.
+  /// Shells that were simplified more than once because the result broke a guarantee. Includes
+  /// `certified_shells`.
+  std::uint32_t repeated_shells = 0;
+  /// Shells that kept their given (certified) triangles, because the results broke a guarantee.
+  std::uint32_t certified_shells = 0;
 };
 
 /// Removes points, and connects the others by fewer triangles. The other points keep their bits,

@@ -32,8 +32,9 @@ inline constexpr float kClassRatio = 2;
 /// Enough, because sizes differ at most by the square of ReconstructionParameters::kMostSizeRatio.
 inline constexpr int kMostClasses = 8;
 
-/// Particles by brick, size class, cell (layer, row, column), position and weight. Positions are in
-/// cells relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float holds exactly.
+/// Particles, sorted by brick, size class, cell (layer, row, column), position and weight.
+/// Positions are in cells relative to the brick, in [0, 8), rounded to 2^-17 cells, which a float
+/// holds exactly.
 struct SpaceBins {
   BrickDirectory bricks;
   /// Classes with particles in this frame, largest sizes first; one class for equal sizes.
@@ -46,9 +47,9 @@ struct SpaceBins {
   std::vector<float> weight;          ///< Padded. Empty without volumes, and also with own sizes.
   std::vector<float> size;            ///< Own sizes in spacings, padded; empty for equal sizes.
   std::vector<std::uint32_t> source;  ///< Index of the particle in the frame.
-  /// Images: particles of the frame from this index on. They count for F, but not as particles of
-  /// a body. First come copies beyond the faces of a periodic box, then mirror images behind walls.
-  /// kNoIndex: no images.
+  /// The first image: particles of the frame from this index on are images of other particles. They
+  /// count for F, but not as particles of a body. First come copies beyond the faces of a periodic
+  /// box, then mirror images behind walls. kNoIndex: no images.
   std::uint32_t first_image = kNoIndex;
   /// The first mirror image. Attributes of mirror images are ignored. kNoIndex: none.
   std::uint32_t first_mirror = kNoIndex;

@@ -29,10 +29,11 @@ struct Body {
   BrickPlace lowest{};          ///< One of its nodes with the smallest z.
   std::uint64_t particles = 0;  ///< Number of its particles, without images.
   std::uint64_t copies = 0;     ///< Number of its particles that are copies.
-  bool has_mirrors = false;     ///< Whether it has mirror images of particles (SpaceBins).
+  bool has_mirrors = false;     ///< Whether some of its particles are mirror images (SpaceBins).
   double volume = 0;            ///< Volume of `particles`, world units cubed.
   BodyFate fate = BodyFate::kWhole;
-  bool is_complete = false;  ///< A cut body that lacks no part. Only in a box that wraps.
+  /// Whether this image of a cut body has all particles of the body. Set only in a box that wraps.
+  bool is_complete = false;
   /// For a cut image: the smallest index among all images of the body. Else its own index, from
   /// DropBodies on. ChooseImages gives all images the particles and the volume of the whole body.
   std::uint32_t first_image = kNoIndex;

@@ -13,7 +13,7 @@ namespace partiemc::space {
 struct SpaceField {
   /// F in cells, by brick, layer, row, column. Where `exact` is not set, only the sign is right.
   std::vector<std::array<float, kBrickNodes>> values;
-  std::vector<BrickBits> inside;  ///< The nodes with F < 0; then changed by cleaning.
+  std::vector<BrickBits> inside;  ///< The nodes with F < 0, except where cleaning has changed this.
   std::vector<BrickBits> exact;   ///< The nodes where `values` is F.
 
   /// F at a node that exists.

@@ -8,7 +8,8 @@ namespace {
 
 constexpr double kMostSteps = 1 << 30;
 constexpr double kMargin = .25;  // In steps.
-// Each round drops squares that touch others only at corners. A cap that needs more has none.
+// Each round drops squares that touch others only at corners. A cap that needs more rounds gets no
+// squares.
 constexpr int kMostRounds = 8;
 
 }  // namespace
@@ -50,7 +51,7 @@ void CapSquares::ListRows(const CutMesh& mesh, const CutMesh::Cap& cap) {
   });
 }
 
-/// Adds the squares of a row. `edges`: those of the row, sorted by their first columns.
+/// Adds the squares of a row. `edges`: the edges near the row, sorted by their first columns.
 void CapSquares::FillRow(std::span<RowEdge> edges) {
   crossings_.clear();
   for (const RowEdge& edge : edges) {
@@ -58,11 +59,12 @@ void CapSquares::FillRow(std::span<RowEdge> edges) {
   }
   std::sort(crossings_.begin(), crossings_.end(),
             [](const RowEdge& a, const RowEdge& b) { return a.at < b.at; });
-  // Of crossings that rounding has put in the wrong order, both are near all columns between them.
+  // If rounding puts two crossings in the wrong order, all columns between them are near both
+  // edges. Such columns get no square.
   int depth = 0;
   std::uint32_t shell = 0;  // Of the last entry.
   std::size_t next = 0;
-  std::int32_t free = 0;  // The first column that no edge before `next` is near.
+  std::int32_t free = 0;  // With `has_free`: the first column right of all edges before `next`.
   bool has_free = false;
   for (std::size_t k = 0; k + 1 < crossings_.size(); ++k) {
     depth += crossings_[k].is_entry ? 1 : -1;
@@ -91,8 +93,8 @@ bool CapSquares::Has(const Place& at) const {
   return found != squares_.end() && found->at == at;
 }
 
-/// Drops squares that touch at a corner although no square beside both connects them. Returns
-/// whether there were none.
+/// Drops both squares of each pair that touches at a corner without a third square beside both.
+/// Returns true if there was no such pair.
 bool CapSquares::DropPinches() {
   pinched_.assign(squares_.size(), 0);
   bool any = false;

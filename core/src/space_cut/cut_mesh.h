@@ -38,12 +38,12 @@ struct CutMesh {
   std::vector<double> points;            ///< x0, y0, z0, x1, ...; may hold unused points.
   std::vector<float> normals;            ///< Per point, interleaved.
   std::vector<std::uint32_t> triangles;  ///< Three point indices each.
-  std::vector<std::uint32_t> shell_of;   ///< Per triangle: any number; its parts get the same.
+  std::vector<std::uint32_t> shell_of;   ///< Per triangle: a number, which its parts inherit.
   std::vector<std::uint8_t> is_clipped;  ///< Per triangle: 1 if it is a part of a cut triangle.
-  std::vector<Cap> caps;                 ///< One for each plane, in the order of the calls.
-  /// Set by CapPlanes: cap k has the triangles [cap_offsets[k], cap_offsets[k + 1]), after all
-  /// triangles of no cap. CutSurface then appends shells that are not cut, and drops dust. After
-  /// that, only cap_offsets[0] is valid.
+  std::vector<Cap> caps;                 ///< One for each call of CutAtPlane, in the same order.
+  /// Set by CapPlanes: cap k has the triangles [cap_offsets[k], cap_offsets[k + 1]). All triangles
+  /// outside of caps come before cap_offsets[0]. CutSurface then appends shells that are not cut,
+  /// and drops dust. After that, only cap_offsets[0] is valid.
   std::vector<std::uint32_t> cap_offsets;
 };
 

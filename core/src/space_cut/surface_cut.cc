@@ -83,8 +83,10 @@ struct Moves {
   std::size_t faces = 0, walls = 0;
 };
 
-/// Cuts the mesh at all planes. If this fails, returns false and advances the moves of the planes
-/// that fail: walls stay at rest if only faces fail, because points on a moved wall must return.
+/// Moves each plane as `moves` states, cuts the mesh at all planes, and triangulates the caps. If a
+/// cut fails, returns false and advances the move for this kind of plane only (faces or walls):
+/// walls stay at rest if possible, because the points on a moved wall must return to the wall. If
+/// the caps fail, advances both moves.
 bool CutAtPlanes(const SurfaceCutInput& input, Moves& moves, SurfaceCutScratch& s) {
   std::array<double, 3> farthest{};
   for (const AxisPlane& plane : input.planes) {
@@ -346,7 +348,7 @@ void Assembly::NameLargest() {
 /// Sets outer_of. A piece with triangles on a plane borders on the outside, so it is no cavity.
 void Assembly::Nest() {
   const auto pieces = static_cast<std::uint32_t>(pieces_.sources.size());
-  // `only` is kNoShell without an outer piece.
+  // `only` of a shell is kNoShell if the shell has no outer piece, kSeveral if it has several.
   constexpr std::uint32_t kSeveral = kNoIndex - 1;
   std::vector<std::uint32_t>& only = s_.only;
   only.assign(from_.ShellCount(), kNoShell);

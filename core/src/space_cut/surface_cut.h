@@ -1,4 +1,5 @@
-// Cuts shells of a surface at planes parallel to the coordinate planes, and keeps S1 to S5.
+// Cuts shells of a surface at planes parallel to the coordinate planes. The result has the
+// guarantees S1 to S5 (partiemc/surface.h).
 #pragma once
 
 #include <cstdint>
@@ -36,7 +37,7 @@ struct SurfaceCutScratch {
   std::vector<std::uint32_t> point_of;  // By point of the mesh: its point of the new surface.
   std::vector<std::uint32_t> largest;   // By body (body_of): its largest piece.
   std::vector<std::uint32_t> next;
-  std::vector<std::uint32_t> only;  // By given shell: its only outer piece.
+  std::vector<std::uint32_t> only;  // By given shell: its outer piece, if it has only one.
   struct PieceSize {
     Vec3 low, high, origin;
     double volume;
@@ -69,10 +70,11 @@ struct SurfacePieces {
 ///
 /// If a vertex lies on a plane, or rounding leaves a decision open, all faces of a box move, or all
 /// walls. Faces with the same axis move alike, by up to .00021 spacings plus 3e-9 of their largest
-/// coordinate (kShifts in surface_cut.cc). Walls move each on its own, to the side that is kept,
-/// and with walls planes move by at most a sixth of this. The points on a moved wall return to the
-/// wall, if Validate accepts this surface. If Validate rejects it for every move, they stay on the
-/// moved wall. Returns false, with `surface` unchanged, if this does not help, which is a bug.
+/// coordinate (kShifts in surface_cut.cc). Walls move each on its own, to the side that is kept. If
+/// there are walls, all planes move by at most a sixth of this. The points on a moved wall return
+/// to the wall, if Validate accepts this surface. If Validate rejects it for every move, they stay
+/// on the moved wall. Returns false, with `surface` unchanged, if this does not help, which is a
+/// bug.
 /// Requires: S1 to S5; `surface.attributes` without values. Deterministic. Cost: linear in the
 /// surface, plus CutAtPlane and CapPlanes, plus ShellsAround if a shell with a cavity falls into
 /// several parts. Throws Cancelled as ThrowIfCancelled, with `surface` unchanged.

@@ -56,7 +56,9 @@ struct NumberedShells {
   };
   std::vector<Edge> edges;                   ///< Scratch: the crossed edges along x.
   std::vector<std::uint32_t> shell_of_body;  ///< Scratch: by body, its outer shell.
-  std::vector<std::uint32_t> stand_in;  ///< Scratch: by shell, the shell that gives its number.
+  /// Scratch: by shell, the shell whose number it gets: itself, or for an image of a cut body the
+  /// first image. kNoShell: no number.
+  std::vector<std::uint32_t> stand_in;
 };
 
 /// Collects the runs of the shells, with numbers, and sets all members of `shells`.

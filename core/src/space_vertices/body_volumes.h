@@ -47,7 +47,7 @@ struct BodyVolumes {
   struct Best {
     double error = std::numeric_limits<double>::infinity();
     /// SearchVolumes no longer moves the body. Either it has put the body back to its best
-    /// positions, or BeginSearch has got the body as settled.
+    /// positions, or the body is settled (BeginSearch).
     bool is_final = false;
   };
   std::vector<Best> best;            ///< By body.

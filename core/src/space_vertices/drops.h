@@ -1,9 +1,10 @@
 // Replaces the surfaces of drops by ellipsoids, which keep their volume and follow their particles.
 //
-// The level set of a few particles encloses few nodes or none. The surface of such a drop depends
-// on its place in the lattice, so its volume is wrong and it trembles as it moves. An ellipsoid
-// with the moments of the particles avoids both. A drop keeps its surface if the box of the
-// ellipsoid and of a node of the drop touches another surface (core/SURFACES.md, "Drops").
+// A drop is a body of few particles. Its level set encloses few nodes or none. Its surface depends
+// on its position relative to the lattice, so its volume is wrong and it trembles as it moves. An
+// ellipsoid with the moments of the particles avoids both. A drop keeps its surface if the box
+// around the ellipsoid and one node of the drop touches the box of another surface
+// (core/SURFACES.md, "Drops").
 //
 // Bodies that will surely become ellipsoids are found before vertices are placed (SettleDrops).
 // They are settled: their vertices stay at their anchors, and certificate and volume steps leave
@@ -61,7 +62,7 @@ struct Drops {
     std::uint32_t particle = kNoIndex;  ///< Of SpaceBins: a particle without a body.
     std::uint64_t particles = 0;
     double volume = 0;   ///< Cells cubed; of its particles, images included.
-    Vec3 origin, first;  ///< In cells: a place in the drop; the first moment about `origin`.
+    Vec3 origin, first;  ///< In cells: a point in the drop; the first moment about `origin`.
     /// Second moments xx, xy, xz, yy, yz, zz about `origin`, of the particles as balls. In cells.
     std::array<double, 6> second{};
     Box ellipsoid;  ///< Box around the ellipsoid. World units.
@@ -72,7 +73,7 @@ struct Drops {
     bool is_taken = false;           ///< The ellipsoid replaces the surface.
     std::uint32_t first_vertex = 0;  ///< First index in the positions, if it is taken.
   };
-  std::vector<Drop> drops;               ///< Those of bodies, then those of particles without one.
+  std::vector<Drop> drops;               ///< First the bodies, then the particles without a body.
   std::vector<std::uint8_t> is_settled;  ///< By body. Empty: none is.
 
   bool IsSettled(std::uint32_t body) const { return !is_settled.empty() && is_settled[body] != 0; }
@@ -87,7 +88,7 @@ struct Drops {
   std::vector<Reach> reaches;          ///< Scratch: sorted by brick.
   std::vector<std::uint32_t> first;    ///< Scratch: by brick, its first index in `reaches`.
   std::vector<Box> surfaces;           ///< Scratch: by drop, around the surface of its body.
-  std::vector<std::uint32_t> refused;  ///< Scratch: drops of bodies that are not taken.
+  std::vector<std::uint32_t> refused;  ///< Scratch: indices of drops that keep their surfaces.
 };
 
 /// Sets `is_settled`: bodies with an ellipsoid that ReplaceDrops will accept, unless a vertex of

@@ -116,8 +116,8 @@ class ChunkSearch {
     return sizes_.empty() ? square_ : square_ * double{sizes_[loop]} * double{sizes_[loop]};
   }
 
-  /// Finds the near loops, which are the loops of the chunk and then connected loops within reach
-  /// of the box around it, and the links between near loops.
+  /// Finds the near loops, breadth first, and the links between them. The near loops are the loops
+  /// of the chunk, then the loops linked to them within reach of the box around the chunk.
   void FindNear() {
     count_ = 0;
     slots_.fill(kFree);
@@ -167,8 +167,8 @@ class ChunkSearch {
   void GrowWindows() {
     std::fill_n(found_.begin(), count_, std::uint64_t{0});
     for (std::size_t k = 0; k < ends_.count; ++k) found_[k] = std::uint64_t{1} << k;
-    // Near loops are in the order of their links from the chunk, so that few passes in alternating
-    // directions reach all of them.
+    // FindNear has listed the near loops by their number of links from the chunk. Therefore a few
+    // passes in alternating directions reach all of them.
     for (bool is_up = true, has_grown = true; has_grown; is_up = !is_up) {
       has_grown = false;
       for (std::size_t n = 0; n < count_; ++n) {

@@ -1,4 +1,4 @@
-// Moves the vertices in cells towards roots of the level set.
+// Moves the vertices in cells towards roots of the level set, and finds their normals.
 #pragma once
 
 #include <span>
@@ -13,7 +13,7 @@ namespace partiemc::space {
 
 struct RootConstants {
   double newton_step = .3;  ///< Longest step, in cells.
-  double long_step = .07;  ///< If the step is longer, evaluates the gradient again after it. Cells.
+  double long_step = .07;   ///< In cells. After a longer step the gradient is evaluated again.
 };
 
 /// Moves the vertices in cells by one Newton step, at most to kAnchorMargin from the faces of their

@@ -27,7 +27,7 @@ inline std::int32_t RingUnits(double cells) {
   return static_cast<std::int32_t>(static_cast<std::int64_t>(cells * kRingUnitsPerCell));
 }
 
-/// The difference `to` - `from`. Requires: less than 512 cells.
+/// Returns `to` - `from` in units. Requires: the true difference is less than 512 cells.
 inline std::int32_t UnitsBetween(std::int32_t from, std::int32_t to) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) -
                                    static_cast<std::uint32_t>(from));

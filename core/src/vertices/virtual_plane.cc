@@ -126,13 +126,13 @@ struct ClosedRun {
   std::size_t VertexAt(std::ptrdiff_t k) const { return first + static_cast<std::size_t>(k); }
   const Point& PointAt(std::ptrdiff_t k) const { return v.point[VertexAt(k)]; }
   const VertexNormal& NormalAt(std::ptrdiff_t k) const { return v.normal[VertexAt(k)]; }
-  // Number of points before the run returns on its own points.
+  // Number of points before the points repeat (OpenRun).
   std::ptrdiff_t OwnCount() const { return count; }
   bool HasVertex(std::ptrdiff_t) const { return true; }
 };
 
-// A free stretch between walls with its continuations, as a ring: along the points and back, each
-// end once.
+// A free stretch between walls with its continuations, as a ring. The ring runs along the points
+// and back; it has both end points once and all other points twice.
 struct OpenRun {
   std::span<const StretchPoint> points;
 

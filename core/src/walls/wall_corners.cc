@@ -13,11 +13,13 @@
 namespace partiemc {
 namespace {
 
-// The arms, in spacings from the point: beginning, and distance of the samples.
+// An arm is a part of the ring on one side of a point. It begins kBegin spacings from the point and
+// has kSamples samples, kStep spacings apart.
 constexpr double kBegin = 1.5, kStep = .5;
 constexpr std::size_t kSamples = 7;
 constexpr double kLength = kBegin + kStep * (kSamples - 1);
-// Least turn between the arms, radians, and the largest share of it by which an arm may bend.
+// The angle by which the ring turns from one arm to the other is at least kLeastTurn, in radians.
+// An arm bends by at most kMostBend of this angle.
 constexpr double kLeastTurn = .52, kMostBend = 1.0 / 7;
 // Farthest corner from the outline, in spacings.
 constexpr double kFarthest = 1.5;
@@ -126,8 +128,8 @@ std::optional<WallCornerScratch::Corner> CornerAt(const Ring& ring, std::size_t 
   return WallCornerScratch::Corner{static_cast<std::uint32_t>(point), at, distance};
 }
 
-// Of corners closer along the ring than 2 kBegin spacings, keeps only the one nearest to the
-// outline. Compares each corner with the last one kept.
+// If successive corners are less than 2 kBegin spacings apart along the ring, keeps only the corner
+// nearest to the outline. Compares each corner with the last one kept.
 void KeepNearest(const Ring& ring, double h, std::vector<WallCornerScratch::Corner>& corners) {
   const auto are_near = [&](const auto& a, const auto& b) {
     return std::abs(ring.Between(a.point, b.point)) < 2 * kBegin * h;

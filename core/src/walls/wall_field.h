@@ -118,7 +118,8 @@ class WallField {
   std::vector<Crossing> crossings_;                             // In a row, by x.
   std::vector<std::uint8_t> is_odd_;     // By solid: odd number of crossings so far.
   std::vector<std::uint8_t> is_listed_;  // By solid: has lines near the tile (SetTile).
-  std::size_t covering_ = 0;             // Solids with closed loops that contain the mark.
+  // Number of solids with closed loops that contain the mark of the current tile.
+  std::size_t covering_ = 0;
 };
 
 }  // namespace partiemc

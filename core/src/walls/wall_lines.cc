@@ -15,7 +15,8 @@ constexpr double kTie = 1e-9;
 // Longer lines, in cells, get points at the window, and count as having this length.
 constexpr double kLong = 1 << 20;
 
-// The unit vector from a to b, which differ. Products of their differences may overflow.
+// The unit vector from a to b. Requires: a != b. First scales the difference to a size near 1,
+// because its squares may overflow.
 Point UnitFrom(const Point& a, const Point& b) {
   Point along = Minus(b, a);
   along = Times(along, 1 / std::max(std::abs(along.x), std::abs(along.y)));

@@ -36,7 +36,7 @@ struct WallPlace {
   double share = 0;
 };
 
-/// The place of a wall that is nearest to a point.
+/// The place on the walls that is nearest to a point.
 struct NearestWall {
   WallPlace place;
   double height = std::numeric_limits<double>::infinity();  ///< In cells; negative in the solid.

@@ -62,7 +62,8 @@ struct Event {
   std::string message;  ///< One line for people; not set for results and parts.
 };
 
-/// Size limits of one frame; 0: no limit. A larger frame is refused.
+/// Limits of the server for one frame; 0: no limit. Send refuses a frame with too many particles or
+/// bytes. The server refuses a frame with too many tiles.
 struct StreamLimits {
   std::uint64_t max_particles_per_frame = 0;
   std::uint64_t max_frame_bytes = 0;  ///< Bytes of one serialised frame.
