@@ -117,6 +117,9 @@ absl::Status TakeWallParticles(const Frame& given, const ReconstructionParameter
   status = b.wall_particles.Take(given, parameters);
   if (!status.ok()) return status;
   const Frame& fluid = b.wall_particles.fluid();
+  if (fluid.ParticleCount() == 0 && given.ParticleCount() > 0) {
+    prepared.doubts.Add(Doubt::kWallsHideFluid);
+  }
   prepared.lifted = {.frame = fluid, .particles = fluid.ParticleCount()};
   const auto lengths = DecideLengths(parameters, fluid, state, b.spacing);
   if (!lengths.ok()) return lengths.status();

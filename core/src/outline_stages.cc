@@ -136,13 +136,28 @@ absl::Status FindWalls(const OutlineTask& task, const Scale& scale, FrameSize& s
   return absl::OkStatus();
 }
 
+std::uint64_t CountInside(const LevelSet& level_set) {
+  std::uint64_t count = 0;
+  for (const BitRows& rows : level_set.inside) {
+    for (const std::uint32_t row : rows) count += static_cast<std::uint64_t>(CountBits(row));
+  }
+  return count;
+}
+
+// Cuts the fluid at the walls.
+void ApplyWalls(const Scale& scale, Workspace::Buffers& b, Doubts& doubts) {
+  const std::uint64_t before = CountInside(b.level_set);
+  b.walls.Apply(b.bins.tiles, scale.spacing, b.level_set);
+  if (3 * CountInside(b.level_set) < before) doubts.Add(Doubt::kWallsHideFluid);
+}
+
 // Runs the stages field, crossings and rings.
-void FindRings(const OutlineTask& task, const Scale& scale, Workspace::Buffers& b) {
+void FindRings(const OutlineTask& task, const Scale& scale, Workspace::Buffers& b, Doubts& doubts) {
   StageObserver* const observer = task.observer;
   InStage(observer, Stage::kField, [&] {
     scale.is_slice ? SampleSlice(b.bins, scale, b.level_set)
                    : SampleField(b.bins, scale, b.level_set);
-    if (task.walls.Any()) b.walls.Apply(b.bins.tiles, scale.spacing, b.level_set);
+    if (task.walls.Any()) ApplyWalls(scale, b, doubts);
   });
   InStage(observer, Stage::kCrossings,
           [&] { FindCrossings(b.bins.tiles, b.level_set, b.crossings); });
@@ -334,7 +349,8 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
                  .phases = CountPhases(parameters)};
   status = task.walls.Any() ? FindWalls(task, scale, size, memory, b) : memory.ReserveOutline(size);
   if (!status.ok()) return status;
-  FindRings(task, scale, b);
+  FindRings(task, scale, b, result.statistics.doubts);
+  b.last.doubts = result.statistics.doubts;
   FrameSize whole = SizeOf(parameters, seen, b);
   if (task.HasCopies()) whole.cut_segments = whole.segments;
   whole.wall_tiles = size.wall_tiles;

@@ -337,7 +337,9 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
                              }},
                         b.frame, prepared);
     size.particles = frame.ParticleCount();
-    if (!checked.ok() || size.particles == 0) return checked;
+    if (!checked.ok()) return checked;
+    if (3 * lifted.particles < given.ParticleCount()) doubts.Add(Doubt::kWallsHideFluid);
+    if (size.particles == 0) return checked;
     size.box_axes = static_cast<std::uint64_t>(std::ranges::count(copied.has_copies, true));
     b.virtual_plane.volumes.before_walls = prepared.before_walls;
     b.virtual_plane.volumes.in_box = prepared.in_box;
@@ -364,6 +366,7 @@ absl::Status SurfaceReconstructor::ReconstructOrThrow(const Frame& given, const 
   });
   if (!status.ok()) return status;
   if (frame.ParticleCount() == 0) {
+    surface.statistics.doubts = doubts;
     if (state != nullptr) EndIdentities(frame, state->history, b.next_history);
     return absl::OkStatus();
   }

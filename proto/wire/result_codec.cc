@@ -372,6 +372,8 @@ v1::Doubt ToWire(Doubt doubt) {
       return v1::DOUBT_VOLUMES_CONTRADICT_SPACING;
     case Doubt::kPositionsCoarse:
       return v1::DOUBT_POSITIONS_COARSE;
+    case Doubt::kWallsHideFluid:
+      return v1::DOUBT_WALLS_HIDE_FLUID;
   }
   return v1::DOUBT_UNSPECIFIED;
 }

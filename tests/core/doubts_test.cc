@@ -226,5 +226,31 @@ TEST(Doubts, ACoordinateAcrossThePlaneMayBeAsCoarseAsItLikes) {
   EXPECT_TRUE(stream.Next(frame).statistics.doubts.empty());
 }
 
+TEST(Doubts, WallsThatHideMostOfTheFluidAreReported) {
+  Particles body = support::Lattice(20, 20, .5, .5);
+  const auto doubted = [&](ReconstructionParameters parameters) {
+    parameters.spacing = 1.0;
+    return Has(ResultStream(parameters).Next(body), Doubt::kWallsHideFluid);
+  };
+  const auto floor = [](double y) { return ReconstructionParameters{.walls = {{{0, y, 1, y}}}}; };
+  const auto ceiling = [](double y) { return ReconstructionParameters{.walls = {{{1, y, 0, y}}}}; };
+  EXPECT_FALSE(doubted({}));
+  EXPECT_FALSE(doubted(floor(0)));
+  EXPECT_FALSE(doubted(floor(12)));
+  EXPECT_TRUE(doubted(floor(15)));
+  EXPECT_FALSE(doubted(ceiling(8)));
+  EXPECT_TRUE(doubted(ceiling(5)));
+  const Wall tank{{0, 0, 20, 0, 20, 20, 0, 20}};
+  const Wall obstacle{{0, 20, 20, 20, 20, 0, 0, 0}};
+  EXPECT_FALSE(doubted({.walls = {tank}}));
+  EXPECT_TRUE(doubted({.walls = {obstacle}}));
+  // Wall particles are no fluid.
+  body.phases.assign(body.size(), 2);
+  EXPECT_FALSE(doubted({.wall_phases = {3}}));
+  EXPECT_TRUE(doubted({.wall_phases = {2}}));
+  for (std::size_t k = 0; k < 40; ++k) body.phases[k] = 1;
+  EXPECT_FALSE(doubted({.wall_phases = {2}}));
+}
+
 }  // namespace
 }  // namespace partiemc

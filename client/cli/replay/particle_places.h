@@ -1,4 +1,4 @@
-// Compares the places of the particles with the planes and walls of the flags.
+// Compares the places of the particles with the planes of slices.
 #pragma once
 
 #include <array>
@@ -13,17 +13,15 @@
 
 namespace partiemc::client {
 
-/// Finds slices that are beside the particles of all frames, and walls with most particles of a
-/// frame behind them: probably a wrong coordinate or a wrong direction.
+/// Finds slices that are beside the particles of all frames: probably a wrong coordinate.
 class ParticlePlaces {
  public:
   ParticlePlaces(const ReplayFlags& flags, const ReconstructionParameters& parameters);
 
-  /// Cost: one pass over the particles for each slice; at most 1,000 particles
-  /// for each wall, times its points.
+  /// Cost: one pass over the particles for each slice.
   void Add(const RecordedFrame& frame);
 
-  /// One line for each such slice, and one for the first frame with most particles behind walls.
+  /// One line for each such slice.
   std::vector<std::string> Warnings() const;
 
  private:
@@ -37,13 +35,8 @@ class ParticlePlaces {
     double high = -std::numeric_limits<double>::infinity();
   };
 
-  // The flag of the first wall that a position is behind; empty for none.
-  std::string WallBefore(const double* position, int components) const;
-  void CountBehindWalls(const RecordedFrame& frame);
-
-  const ReconstructionParameters parameters_;
+  const double reach_;  // The outline is half a spacing outside of the particles.
   std::vector<Range> slices_;
-  std::string behind_walls_;  // The warning of walls; empty: none so far.
 };
 
 }  // namespace partiemc::client

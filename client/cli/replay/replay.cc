@@ -74,6 +74,10 @@ absl::StatusOr<std::unique_ptr<FrameStream>> OpenStream(const ReplayFlags& flags
   return *std::move(stream);
 }
 
+std::string SpacingText(double spacing, std::string_view source) {
+  return Concat("spacing ", spacing, " estimated from ", source, "; --spacing sets it");
+}
+
 struct ReplayEnd {
   ExitCode code = kGood;
   std::string error = {};  // Empty for kGood and kInterrupted.
@@ -132,6 +136,7 @@ class Receiver {
       Refuse(frame->source, RefusalText(*frame, flags_.sequence.attributes, event_.message));
     } else {
       if (flags_.check) Check(frame->source);
+      TellSpacing(frame->source);
       // A loop has no outputs.
       if (!flags_.loop) {
         const AttributeValues color = ParticleColor(*frame);
@@ -236,6 +241,15 @@ class Receiver {
     return absl::InternalError("the geometry is not that of its digests: report this");
   }
 
+  // Prints the spacing of the first outline for which it was estimated.
+  void TellSpacing(const std::string& source) {
+    const FrameStatistics& statistics = event_.frame.result.statistics;
+    if (flags_.quiet || is_spacing_told_ || stream_.info().parameters.spacing) return;
+    if (statistics.spacing == 0 || statistics.doubts.Has(Doubt::kSpacingProvisional)) return;
+    is_spacing_told_ = true;
+    progress_.Note("partiemc: " + SpacingText(statistics.spacing, source));
+  }
+
   void Refuse(const std::string& source, const std::string& message) {
     outputs_.AddRefused();
     progress_.Note(Concat("partiemc: ", OneLine(source), ": frame refused: ", OneLine(message)));
@@ -250,6 +264,7 @@ class Receiver {
   MissingPhases missing_phases_;
   ParticlePlaces particle_places_;
   Event event_;
+  bool is_spacing_told_ = false;
   std::uint64_t answered_ = 0, failed_checks_ = 0;
 };
 
@@ -267,13 +282,14 @@ ExitCode Conclude(const ReplayFlags& flags, const ReconstructionParameters& para
   const std::uint64_t failed_checks = receiver.failed_checks();
   const Summary& summary = outputs.summary();
   ExitCode code = kGood;
-  for (const std::string& warning : summary.Warnings()) Complain(kGood, warning);
+  const std::vector<std::string> of_input = summary.Warnings();
+  for (const std::string& warning : of_input) Complain(kGood, warning);
   for (const std::string& warning : receiver.missing_phases().Warnings()) Complain(kGood, warning);
   const std::vector<std::string> of_places = receiver.particle_places().Warnings();
   for (const std::string& warning : of_places) Complain(kGood, warning);
   if (summary.is_empty()) {
     Complain(kGood, Concat("no frame has ", flags.surface ? "a body" : "an outline",
-                           of_places.empty() ? "; is --spacing right?" : ""));
+                           of_input.empty() && of_places.empty() ? "; is --spacing right?" : ""));
   }
   if (summary.refused_count() > 0 && !flags.keep_going) {
     Complain(kInput, Concat(Plural(summary.refused_count(), "frame"),
@@ -337,8 +353,7 @@ int Replay(const ReplayFlags& given) {
     if (!spacing.ok()) return Complain(kInput, spacing.status());
     input->spacing = *spacing;
     if (!flags.quiet) {
-      Complain(kGood,
-               Concat("spacing ", *spacing, " estimated from the first frame; --spacing sets it"));
+      Complain(kGood, SpacingText(*spacing, "the first frame"));
     }
   }
   const auto box = BoxOfInput(flags);

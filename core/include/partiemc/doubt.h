@@ -24,11 +24,14 @@ enum class Doubt : std::uint8_t {
   /// Positions are float32, and the step to the next float at the coordinate farthest from 0
   /// exceeds 1/16 of the spacing (own sizes: of the smallest size). Not checked for slices.
   kPositionsCoarse,
+  /// More than two thirds of the fluid are behind walls, or all particles are wall particles. An
+  /// outline counts its inside nodes, a surface its particles.
+  kWallsHideFluid,
 };
 
 inline constexpr std::array kAllDoubts = {Doubt::kSpacingProvisional, Doubt::kSpacingContradicted,
-                                          Doubt::kVolumesContradictSpacing,
-                                          Doubt::kPositionsCoarse};
+                                          Doubt::kVolumesContradictSpacing, Doubt::kPositionsCoarse,
+                                          Doubt::kWallsHideFluid};
 
 /// "spacing-provisional", "spacing-contradicted", ...
 std::string_view Name(Doubt doubt);

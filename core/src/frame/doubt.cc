@@ -12,6 +12,8 @@ std::string_view Name(Doubt doubt) {
       return "volumes-contradict-spacing";
     case Doubt::kPositionsCoarse:
       return "positions-coarse";
+    case Doubt::kWallsHideFluid:
+      return "walls-hide-fluid";
   }
   return "";
 }
@@ -28,6 +30,11 @@ std::string_view Explanation(Doubt doubt) {
              "the unit";
     case Doubt::kPositionsCoarse:
       return "float32 positions are coarse for the spacing; send float64, or relative to an origin";
+    case Doubt::kWallsHideFluid:
+      return "most of the fluid is behind walls, or all particles are wall particles; the fluid is "
+             "on "
+             "the left of a wall (tanks are counter-clockwise, obstacles clockwise), and on the "
+             "fluid side of a wall plane";
   }
   return "";
 }

@@ -160,9 +160,10 @@ TEST(WallsReplay, WallsThatLeaveNothingAreTold) {
   const Ran ran = RunPartiemc({"replay", folder.Path("column.csv"), "--local", "--spacing", "1",
                                "--check", "--wall", "0,0,0,20,10,20,10,0"});  // Clockwise.
   EXPECT_EQ(ran.exit_code, 0) << ran.error;
-  EXPECT_THAT(ran.error,
-              AllOf(HasSubstr("column.csv: all particles are behind a wall (--wall number 1)"),
-                    HasSubstr("no frame has an outline\n")));
+  EXPECT_THAT(
+      ran.error,
+      AllOf(HasSubstr("in 1 of 1 frame: walls-hide-fluid: most of the fluid is behind walls"),
+            HasSubstr("no frame has an outline\n")));
 }
 
 TEST(WallsReplay, WallsBeforeMostParticlesAreTold) {
@@ -183,14 +184,14 @@ TEST(WallsReplay, WallsBeforeMostParticlesAreTold) {
     EXPECT_EQ(ran.exit_code, 0) << ran.error;
     return ran.error;
   };
-  // Clockwise, so an obstacle, from the height 8: twelve of twenty rows are in it.
-  EXPECT_THAT(error("column.csv", {"--wall", "0,0,1,0", "--wall", "0,8,0,20,20,20,20,8"}),
-              HasSubstr("most particles are behind a wall (--wall number 2), so they are not"));
+  // Clockwise, so an obstacle, from the height 4: sixteen of twenty rows are in it.
+  EXPECT_THAT(error("column.csv", {"--wall", "0,0,1,0", "--wall", "0,4,0,20,20,20,20,4"}),
+              HasSubstr("walls-hide-fluid"));
   EXPECT_THAT(error("column.csv", {"--wall", "0,8,20,8,20,20,0,20"}), IsEmpty());
   EXPECT_THAT(error("column.csv", {"--wall", "20,12,0,12"}), IsEmpty());
-  EXPECT_THAT(error("column.csv", {"--wall", "20,8,0,8"}), HasSubstr("--wall number 1"));
-  EXPECT_THAT(error("block.csv", {"--surface", "--wall-plane", "z=5"}),
-              HasSubstr("most particles are behind a wall (--wall-plane number 1)"));
+  EXPECT_THAT(error("column.csv", {"--wall", "20,4,0,4"}), HasSubstr("walls-hide-fluid"));
+  EXPECT_THAT(error("block.csv", {"--surface", "--wall-plane", "z=7"}),
+              HasSubstr("walls-hide-fluid"));
   EXPECT_THAT(error("block.csv", {"--surface", "--wall-plane", "z=5,below"}), IsEmpty());
 }
 

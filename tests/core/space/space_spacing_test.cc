@@ -189,6 +189,21 @@ TEST(SurfaceDoubts, VolumesAndCoarsePositionsAreReported) {
   EXPECT_TRUE(DoubtsOf(frame, {}).Has(Doubt::kPositionsCoarse));
 }
 
+TEST(SurfaceDoubts, WallPlanesBeforeMostParticlesAreReported) {
+  Random random(9);
+  const SpaceParticles body = support::Box(kLow, kHigh, 0, random);
+  const auto doubted = [&](double height, bool is_fluid_above) {
+    const WallPlane plane{.axis = 2, .position = height, .is_fluid_above = is_fluid_above};
+    return DoubtsOf(body.AsFrame(), {.wall_planes = {plane}}).Has(Doubt::kWallsHideFluid);
+  };
+  const double middle = .5 * (kLow.z + kHigh.z);
+  EXPECT_FALSE(doubted(middle, true));
+  EXPECT_TRUE(doubted(middle + 4, true));
+  EXPECT_TRUE(doubted(kHigh.z + 9, true));
+  EXPECT_FALSE(doubted(middle, false));
+  EXPECT_TRUE(doubted(middle - 4, false));
+}
+
 TEST(SpacingInPlane, IsThatOfStreamsWithoutASpacing) {
   const std::vector<double> xy = {0, 0, 2, 0, 0, 2, 2, 2, std::nan(""), 7};
   EXPECT_EQ(EstimateSpacing({.positions = std::span<const double>(xy)}), 2.0);
