@@ -212,16 +212,84 @@ absl::Status FillRings(const FillTask& task, Workspace::Buffers& b, Result& resu
 // RepairPhases fails, which is a bug.
 absl::Status DividePhases(const OutlineTask& task, const Frame& frame, const Scale& scale,
                           FrameMemory& memory, Workspace::Buffers& b, Rings& rings) {
-  const PhaseInput input{frame,  task.parameters, task.variant, scale,
-                         b.bins, b.crossings,     b.topology,   b.vertex_scratch.vertices};
+  PhaseInput input{frame,  task.parameters, task.variant, scale,
+                   b.bins, b.crossings,     b.topology,   b.vertex_scratch.vertices};
+  if (b.last.percolation) {
+    input.percolation = &*b.last.percolation;
+    input.originals = task.prepared->lifted.originals;
+  }
   InStage(task.observer, Stage::kVertices, [&] { MapPhases(input, b.phases); });
   FrameSize size = SizeOf(task.parameters, frame, b);
   size.interface_points = InterfacePointsOf(b.phases);
+  // A phase has points of the body and of interfaces.
+  if (task.HasCopies()) size.cut_segments = size.segments + size.interface_points;
   if (absl::Status status = memory.ReserveOutline(size); !status.ok()) return status;
   const bool is_divided = InStage(task.observer, Stage::kVertices,
                                   [&] { return PlacePhases(input, b.placed, b.phases, rings); });
   if (is_divided) return absl::OkStatus();
   return absl::InternalError("outlines of phases cross although every point is at its root");
+}
+
+// Rings of the body or of a phase, and what they consist of.
+struct RingParts {
+  const Percolation& percolation;
+  Crossings& crossings;
+  const RingTopology& topology;
+  PlacedVertices& placed;
+  Rings& rings;
+};
+
+RingCutInput CutInput(const RingParts& parts, const OutlineTask& task, const Scale& scale) {
+  return {parts.percolation, parts.topology, scale.spacing * scale.cell_size,
+          HasPhases(task.parameters)};
+}
+
+// Whether the outlines of all phases can be cut with these steps. Overwrites `b.placed_phase`.
+bool CanCutPhases(const OutlineTask& task, const Scale& scale, int steps, Workspace::Buffers& b) {
+  for (std::size_t k = 0; k < CountPhases(task.parameters); ++k) {
+    const Percolation percolation = b.phases.images.OfPhase(*b.last.percolation, k);
+    PhaseRings& phase = b.phases.rings[k];
+    const RingParts parts{percolation, phase.crossings, phase.topology, b.placed_phase,
+                          b.phase_rings};
+    WritePhaseRings(b.phases, scale, static_cast<PhaseLabel>(k + 1), b.placed_phase, b.phase_rings);
+    RemoveGoneRings(percolation, phase.topology, b.placed_phase, b.phase_rings);
+    if (!CanCutRings(CutInput(parts, task, scale), steps, b.ring_cut, b.placed_phase,
+                     b.phase_rings)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Cuts rings at the faces of the box, and their interior cells. Returns false if this is not
+// possible with these steps.
+bool CutParts(const OutlineTask& task, const Scale& scale, int steps, const RingParts& parts,
+              Workspace::Buffers& b, FrameStatistics& statistics) {
+  const TileDirectory& directory = b.bins.tiles;
+  if (TraitsOf(task.parameters.placement).refines) {
+    // Before the cut drops the segments outside of the window: while their vertices moved, these
+    // segments may have passed over cells inside.
+    ExcludeTouchedCells(directory, parts.rings.points, parts.rings.offsets, parts.placed.roots,
+                        scale.cell_size, parts.crossings.interior);
+  }
+  if (!CutRings(CutInput(parts, task, scale), steps, b.ring_cut, parts.placed, parts.rings,
+                statistics.cut_bodies)) {
+    return false;
+  }
+  ClearOutside(parts.percolation, directory, parts.topology.components, scale.cell_size,
+               parts.crossings);
+  return true;
+}
+
+// Cuts the outline of the body with the fewest steps with which all its phases can be cut, too.
+bool CutOutline(const OutlineTask& task, const Scale& scale, const RingParts& parts,
+                Workspace::Buffers& b, FrameStatistics& statistics) {
+  for (int& steps = b.last.cut_steps = 0; steps < kMostCutSteps; ++steps) {
+    if (CanCutPhases(task, scale, steps, b) && CutParts(task, scale, steps, parts, b, statistics)) {
+      return true;
+    }
+  }
+  return false;
 }
 
 // Keeps the next state of an outline, unless its lengths are provisional. Then no next frame could
@@ -258,9 +326,9 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
     EstimateNormals({b.bins, b.crossings, b.topology, b.sampler, parameters}, known,
                     b.normal_scratch, b.planes, b.next_normals);
   });
-  const bool percolates = task.HasCopies();
-  Percolation percolation;
-  if (percolates) {
+  std::optional<Percolation>& percolation = b.last.percolation;
+  percolation.reset();
+  if (task.HasCopies()) {
     const Prepared& prepared = *task.prepared;
     ChooseBodies({.lifted = prepared.lifted,
                   .window = prepared.window,
@@ -271,13 +339,14 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
                   .bins = b.bins,
                   .crossings = b.crossings},
                  b.choice, b.topology);
-    percolation = {prepared.window, static_cast<std::uint32_t>(prepared.lifted.particles),
-                   b.choice.fates, b.choice.bodies};
+    percolation =
+        Percolation{prepared.window, static_cast<std::uint32_t>(prepared.lifted.particles),
+                    b.choice.fates, b.choice.bodies};
   }
   const bool is_placed = InStage(observer, Stage::kVertices, [&] {
     b.next_area_offset = previous.area_offset;
     return PlaceVertices({frame, b.bins, b.level_set, b.crossings, b.topology, b.sampler, b.planes,
-                          parameters, task.variant, scale, percolates ? &percolation : nullptr,
+                          parameters, task.variant, scale, percolation ? &*percolation : nullptr,
                           task.walls.Any() ? &b.walls : nullptr},
                          b.next_area_offset, b.vertex_scratch, b.placed, result.rings);
   });
@@ -289,7 +358,7 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
       return status;
     }
   }
-  if (percolates) RemoveGoneRings(percolation, b.topology, b.placed, result.rings);
+  if (percolation) RemoveGoneRings(*percolation, b.topology, b.placed, result.rings);
   InStage(observer, Stage::kIdentities, [&] {
     ContinueRings({frame,
                    parameters.plane,
@@ -299,25 +368,16 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
                    b.placed,
                    scale.cell_size,
                    PeriodsOf(parameters, task.frame, scale.cell_size),
-                   percolates ? &percolation : nullptr,
+                   percolation ? &*percolation : nullptr,
                    {},
                    MotionInPlane(parameters, task.frame, previous.history.box, scale.cell_size),
                    BoxToStore(parameters.box, task.frame.box)},
                   previous.history, b.identity_scratch, b.next_history, result.rings);
   });
-  if (percolates) {
-    const double spacing = scale.spacing * scale.cell_size;
-    if (TraitsOf(parameters.placement).refines) {
-      // Before the cut drops the segments outside of the window: while their vertices moved, these
-      // segments may have passed over cells inside.
-      ExcludeTouchedCells(b.bins.tiles, result.rings.points, result.rings.offsets, b.placed.roots,
-                          scale.cell_size, b.crossings.interior);
-    }
-    if (!CutRings({percolation, b.topology, spacing}, b.ring_cut, b.placed, result.rings,
-                  result.statistics.cut_bodies)) {
-      return absl::InternalError("rings cannot be cut at the faces of the box");
-    }
-    ClearOutside(percolation, b.bins.tiles, b.topology.components, scale.cell_size, b.crossings);
+  if (percolation &&
+      !CutOutline(task, scale, {*percolation, b.crossings, b.topology, b.placed, result.rings}, b,
+                  result.statistics)) {
+    return absl::InternalError("rings cannot be cut at the faces of the box");
   }
   b.attribute_scratch.sorted.clear();
   return FillRings({task, frame, scale, b.crossings, b.topology, b.placed, {}}, b, result);
@@ -361,7 +421,10 @@ absl::Status ReconstructOutline(const OutlineTask& task, FrameMemory& memory, Wo
   status = FillOutline(task, seen, scale, memory, b, result);
   if (!status.ok()) return status;
   Summarise(b, result);
-  b.last = {seen, lengths, scale, result.statistics.doubts};
+  b.last.frame = seen;
+  b.last.lengths = lengths;
+  b.last.scale = scale;
+  b.last.doubts = result.statistics.doubts;
   next.state.area_offset = b.next_area_offset;
   std::swap(next.state.normals, b.next_normals);
   KeepState(*lengths, b, next, result);
@@ -372,17 +435,24 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
                               Workspace::Buffers& b, NextState& next, Result& result) {
   next.is_kept = false;
   const LastOutline& last = b.last;
-  result.statistics.particles =
-      static_cast<std::uint64_t>(std::ranges::count(b.phases.labels, label));
+  const std::size_t copies = task.HasCopies() ? task.prepared->lifted.originals.size() : 0;
+  const auto given = std::span(b.phases.labels).first(b.phases.labels.size() - copies);
+  result.statistics.particles = static_cast<std::uint64_t>(std::ranges::count(given, label));
   result.statistics.doubts = last.doubts;
   if (!last.lengths) return absl::OkStatus();
-  const PhaseRings& phase = b.phases.rings[label - 1u];
+  PhaseRings& phase = b.phases.rings[label - 1u];
   FrameSize size{.segments = phase.points.size(),
+                 .cut_segments = last.percolation ? phase.points.size() : 0,
                  .attribute_values = AttributeValuesOf(last.frame)};
   AddMesh(task.parameters, phase.crossings.interior, size);
   absl::Status status = memory.ReserveOutline(size);
   if (!status.ok()) return status;
   WritePhaseRings(b.phases, last.scale, label, b.placed_phase, result.rings);
+  std::optional<Percolation> percolation;
+  if (last.percolation) {
+    percolation = b.phases.images.OfPhase(*last.percolation, label - 1u);
+    RemoveGoneRings(*percolation, phase.topology, b.placed_phase, result.rings);
+  }
   InStage(task.observer, Stage::kIdentities, [&] {
     ContinueRings({last.frame,
                    task.parameters.plane,
@@ -391,11 +461,20 @@ absl::Status ReconstructPhase(const OutlineTask& task, PhaseLabel label, FrameMe
                    phase.topology,
                    b.placed_phase,
                    last.scale.cell_size,
-                   {},
-                   nullptr,
-                   {b.phases.labels, label}},
+                   PeriodsOf(task.parameters, task.frame, last.scale.cell_size),
+                   percolation ? &*percolation : nullptr,
+                   {b.phases.labels, label},
+                   MotionInPlane(task.parameters, task.frame, task.previous.history.box,
+                                 last.scale.cell_size),
+                   BoxToStore(task.parameters.box, task.frame.box)},
                   task.previous.history, b.identity_scratch, b.next_history, result.rings);
   });
+  if (percolation &&
+      !CutParts(task, last.scale, last.cut_steps,
+                {*percolation, phase.crossings, phase.topology, b.placed_phase, result.rings}, b,
+                result.statistics)) {
+    return absl::InternalError("a phase cannot be cut at the faces of the box");
+  }
   status = FillRings({task,
                       last.frame,
                       last.scale,

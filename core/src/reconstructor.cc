@@ -233,6 +233,7 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
                           {b.distinct_ids, b.spacing, b.noise, b.lift}, frame, prepared);
     });
     if (!status.ok()) return status;
+    if (HasPhases(parameters_)) LabelCopies(prepared.lifted.originals, b.phases);
   }
   FrameWalls walls;
   if (HasWalls(parameters_)) {

@@ -48,6 +48,8 @@ struct LastOutline {
   std::optional<Lengths> lengths;  // Empty: the spacing is unknown, so no rings.
   Scale scale;
   Doubts doubts;
+  std::optional<Percolation> percolation;  // Absent without copies of particles.
+  int cut_steps = 0;                       // Of CutRings.
 };
 
 struct Workspace::Buffers {
@@ -86,6 +88,7 @@ struct Workspace::Buffers {
   Phases phases;                      // Empty unless sections have phases.
   std::vector<Attribute> attributes;  // Without the attribute of the phases.
   PlacedVertices placed_phase;
+  Rings phase_rings;  // Of CanCutPhases.
   SurfaceWorkspace surface;
 };
 

@@ -179,18 +179,21 @@ TEST(WarmSlice, AllocatesNothing) {
   EXPECT_EQ(result.rings.RingCount(), 1u);
 }
 
-// Bodies that cross the faces of a periodic box, without and with a layer that percolates.
-class WarmPeriodicFrame : public testing::TestWithParam<std::tuple<bool, Sizes>> {};
+// Bodies that cross the faces of a periodic box, without and with a layer that percolates, and
+// with phases.
+class WarmPeriodicFrame : public testing::TestWithParam<std::tuple<bool, Sizes, bool>> {};
 INSTANTIATE_TEST_SUITE_P(Percolates, WarmPeriodicFrame,
                          testing::Combine(testing::Bool(),
-                                          testing::Values(Sizes::kEqual, Sizes::kOwn)));
+                                          testing::Values(Sizes::kEqual, Sizes::kOwn),
+                                          testing::Bool()));
 
 TEST_P(WarmPeriodicFrame, AllocatesNothing) {
-  const auto [percolates, sizes] = GetParam();
-  const ReconstructionParameters parameters{
+  const auto [percolates, sizes, has_phases] = GetParam();
+  ReconstructionParameters parameters{
       .spacing = 1.0,
       .sizes = sizes,
       .box = PeriodicBox{.axes = {PeriodicAxis{0, 90.5}, PeriodicAxis{0, 80}}}};
+  if (has_phases) parameters.sections = {{.phase = 1}, {.phase = 2}};
   const auto reconstructor = Reconstructor::Create(parameters);
   ASSERT_TRUE(reconstructor.ok());
   std::vector<Particles> frames;
@@ -200,11 +203,12 @@ TEST_P(WarmPeriodicFrame, AllocatesNothing) {
     if (percolates) frame.Add(support::Lattice(90, 12 + k, .3, 60));
     for (std::size_t id = 0; id < frame.size(); ++id) frame.ids.push_back(id);
     if (sizes == Sizes::kOwn) frame.volumes = VaryingVolumes(frame.size());
+    if (has_phases) frame.phases = StripedPhases(frame);
     frames.push_back(frame);
   }
   State state;
   Result result;
-  const int rounds = sizes == Sizes::kOwn ? 24 : 12;  // As in WarmFrame.
+  const int rounds = sizes == Sizes::kOwn || has_phases ? 24 : 12;  // As in WarmFrame.
   ExpectWarm(frames.size(), rounds, 1, [&](std::size_t k, Workspace& workspace) {
     return reconstructor->Reconstruct(frames[k].AsFrame(), state, workspace, result);
   });
@@ -413,6 +417,11 @@ std::vector<MemoryCase> MemoryCases() {
   ReconstructionParameters channel{
       .box = PeriodicBox{.axes = {PeriodicAxis{-300, 600}}},
       .walls = {{{0, -9, 1, -9}}, support::PolygonWall(299, 40, 20, 300, 0, false)}};
+  add("full periodic box of two phases", phased(support::Lattice(150, 150, -74.7, -74.7)),
+      {.sections = phases, .box = boxed(150)});
+  add("percolating noise of two phases", phased(support::Noise(random, 30'000, 300)),
+      {.sections = phases, .box = boxed(600)});
+  add("wrapped drops of two phases", phased(spread(120, 5)), {.sections = phases, .box = wrapped});
   add("noise in a periodic channel", support::Noise(random, 30'000, 300), channel);
   channel.wall_phases = {2};
   add("noise among wall particles of a periodic box", phased(support::Noise(random, 30'000, 300)),

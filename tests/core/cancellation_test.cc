@@ -208,7 +208,7 @@ TEST(CancelledCut, OfRingsKeepsRings) {
   PlacedVertices placed;
   Rings rings;
   std::uint64_t bodies = 7;
-  EXPECT_THROW((void)CutRings(input, scratch, placed, rings, bodies), Cancelled);
+  EXPECT_THROW((void)CutRings(input, 0, scratch, placed, rings, bodies), Cancelled);
   EXPECT_EQ(bodies, 7u);
 }
 

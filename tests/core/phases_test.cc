@@ -394,10 +394,6 @@ TEST(Phases, RefusesWhatHasNoPhases) {
   using P = ReconstructionParameters;
   EXPECT_EQ(with([](P& p) { p.isovalue = .5; }), "parameters.sections[0].phase=1");
   EXPECT_EQ(with([](P& p) { p.slice = SlicePlane(); }), "parameters.sections[0].phase=1");
-  EXPECT_EQ(with([](P& p) {
-              p.box = PeriodicBox{.axes = {PeriodicAxis{0, 100}}};
-            }),
-            "parameters.sections[0].phase=1");
   EXPECT_EQ(with([](P& p) { p.placement = Placement::kQef; }), "parameters.sections[0].phase=1");
   EXPECT_EQ(with([](P& p) { p.output = Output::kSurface; }), "parameters.sections[0].phase=1");
   EXPECT_EQ(with([](P& p) {

@@ -44,6 +44,10 @@ std::vector<Stream> Streams() {
   }
   add("EstimatingTheSpacing", {.spacing_rule = SpacingRule::kEveryFrame});
   add("DividedAmongPhases", {.spacing = 1, .sections = {{.phase = 1}, {.phase = 2}}});
+  add("PhasesOfAWrappedBox",
+      {.spacing = 1,
+       .sections = {{.phase = 1}, {.phase = 2}},
+       .box = PeriodicBox{.axes = {PeriodicAxis{0, 256}, PeriodicAxis{0, 256}}, .wraps = true}});
   add("CutAtWalls", {.spacing = 1, .walls = {{{0, -60, 1, -60}}, {{125, 3, 131, 3, 131, -2}}}});
   add("CutAtWallParticles", {.spacing = 1, .wall_phases = {2}});
   add("OfAWideKernel", {.spacing = 1, .kernel_radius = 5, .cell_size = 2});

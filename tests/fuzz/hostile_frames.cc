@@ -218,8 +218,8 @@ ReconstructionParameters HostileParameters(Choices& choices) {
   const bool may_have_walls = parameters.boundary == Boundary::kBulk &&
                               parameters.sizes == Sizes::kEqual &&
                               parameters.placement == Placement::kVirtualPlane;
-  const bool may_have_phases = !parameters.box && parameters.boundary == Boundary::kBulk &&
-                               parameters.placement == Placement::kVirtualPlane;
+  const bool may_have_phases =
+      parameters.boundary == Boundary::kBulk && parameters.placement == Placement::kVirtualPlane;
   if (may_have_phases && choices.Below(2) == 1) {
     const auto last = static_cast<std::int32_t>(choices.Below(3));
     for (std::int32_t phase = 0; phase <= last; ++phase) {

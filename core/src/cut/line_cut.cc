@@ -19,16 +19,19 @@ bool IsKept(const AxisLine& line, const Point& point) {
 // The point where the segment from a to b crosses the line. Has `is_cut` and `is_wet` of a, because
 // the rest of the segment begins here.
 LoopPoint CrossingOf(const AxisLine& line, const LoopPoint& a, const LoopPoint& b) {
-  const double t = (line.at - Across(line, a.at)) / (Across(line, b.at) - Across(line, a.at));
+  const bool is_reversed = line.is_shared && Across(line, b.at) < Across(line, a.at);
+  const Point& first = is_reversed ? b.at : a.at;
+  const Point& second = is_reversed ? a.at : b.at;
+  const double t = (line.at - Across(line, first)) / (Across(line, second) - Across(line, first));
   const auto between = [&](double from, double to) {
     return std::clamp(from + t * (to - from), std::min(from, to), std::max(from, to));
   };
   LoopPoint point = a;
-  point.at = line.axis == 0 ? Point{line.at, between(a.at.y, b.at.y)}
-                            : Point{between(a.at.x, b.at.x), line.at};
+  point.at = line.axis == 0 ? Point{line.at, between(first.y, second.y)}
+                            : Point{between(first.x, second.x), line.at};
   point.root = point.at;
   point.contact_angle = LoopPoint::kNoContact;
-  const auto s = static_cast<float>(t);
+  const auto s = static_cast<float>(is_reversed ? 1 - t : t);
   const float x = a.normal_x + s * (b.normal_x - a.normal_x);
   const float y = a.normal_y + s * (b.normal_y - a.normal_y);
   const float length = std::sqrt(x * x + y * y);

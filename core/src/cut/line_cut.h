@@ -17,6 +17,8 @@ struct AxisLine {
   int axis = 0;  ///< The coordinate that is constant on the line: 0, 1 for x, y.
   double at = 0;
   bool keeps_above = true;  ///< Whether the kept points have larger coordinates than the line.
+  /// Whether a segment and the reversed segment cross the line at the same point, bit for bit.
+  bool is_shared = false;
 };
 
 struct LoopPoint {

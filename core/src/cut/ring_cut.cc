@@ -13,8 +13,6 @@
 namespace partiemc {
 namespace {
 
-// Number of attempts. Attempt k, from 0, moves the sides by k steps.
-constexpr int kMostShifts = 16;
 // Sides with a smaller coordinate than this, in spacings, move to 0: predicates are not exact for
 // tiny coordinates (vertices.cc).
 constexpr double kAxisReach = 0x1p-96;
@@ -119,8 +117,11 @@ bool CutAtSides(const RingCutInput& input, int steps, RingCutScratch& s) {
       double side = ends->origin + (is_lower ? 0 : ends->length);
       if (std::abs(side) < kAxisReach * input.spacing) side = 0;
       s.kept.Clear();
-      if (!CutAtLine({.axis = axis, .at = side + steps * step, .keeps_above = is_lower}, s.loops,
-                     s.line, s.kept)) {
+      if (!CutAtLine({.axis = axis,
+                      .at = side + steps * step,
+                      .keeps_above = is_lower,
+                      .is_shared = input.is_shared},
+                     s.loops, s.line, s.kept)) {
         return false;
       }
       std::swap(s.loops, s.kept);
@@ -346,24 +347,25 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
   }
 }
 
-bool CutRings(const RingCutInput& input, RingCutScratch& s, PlacedVertices& placed, Rings& rings,
-              std::uint64_t& cut_bodies) {
+bool CanCutRings(const RingCutInput& input, int steps, RingCutScratch& s,
+                 const PlacedVertices& placed, const Rings& rings) {
+  ThrowIfCancelled();
   s.topology_ring.resize(rings.RingCount());
   for (std::uint32_t ring = 0; ring < placed.kept_as.size(); ++ring) {
     if (placed.kept_as[ring] != kNoRing) s.topology_ring[placed.kept_as[ring]] = ring;
   }
-  for (int steps = 0; steps < kMostShifts; ++steps) {
-    ThrowIfCancelled();
-    CollectLoops(input, rings, placed, s);
-    if (!CutAtSides(input, steps, s)) continue;
-    if (!Assembly(input, rings, placed, s).Run() || !NestRings(s)) continue;
-    std::swap(rings, s.rings);
-    std::swap(placed.roots, s.roots);
-    std::swap(placed.group_of_ring, s.group);
-    cut_bodies = CountCutBodies(input, s, s.seen);
-    return true;
-  }
-  return false;
+  CollectLoops(input, rings, placed, s);
+  return CutAtSides(input, steps, s) && Assembly(input, rings, placed, s).Run() && NestRings(s);
+}
+
+bool CutRings(const RingCutInput& input, int steps, RingCutScratch& s, PlacedVertices& placed,
+              Rings& rings, std::uint64_t& cut_bodies) {
+  if (!CanCutRings(input, steps, s, placed, rings)) return false;
+  std::swap(rings, s.rings);
+  std::swap(placed.roots, s.roots);
+  std::swap(placed.group_of_ring, s.group);
+  cut_bodies = CountCutBodies(input, s, s.seen);
+  return true;
 }
 
 void ClearOutside(const Percolation& percolation, const TileDirectory& directory,

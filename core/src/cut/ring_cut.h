@@ -33,7 +33,13 @@ struct RingCutInput {
   const Percolation& percolation;
   const RingTopology& topology;
   double spacing;  ///< World units.
+  /// Whether rings share segments, in opposite directions, with rings that another call cuts. With
+  /// the same steps, both calls find the same cut points, bit for bit.
+  bool is_shared = false;
 };
+
+/// CutRings is tried with 0 steps, 1 step, and so on, up to this number of times.
+inline constexpr int kMostCutSteps = 16;
 
 /// Removes the rings of components with Fate::kGone. In `placed.kept_as`, they become kNoRing.
 void RemoveGoneRings(const Percolation& percolation, const RingTopology& topology,
@@ -45,12 +51,17 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
 /// have none. Holes that are not cut keep theirs. Sets `placed.group_of_ring`, keeps `placed.roots`
 /// parallel to the points, and sets `cut_bodies` to the number of bodies with a ring that is cut.
 ///
-/// If a ring has a vertex on a side, or pieces would touch, all sides move by up to some billionths
-/// of the spacing (kMostShifts in ring_cut.cc), opposite sides in the same direction. Returns false
-/// if this does not help, which is a bug.
+/// Returns false, and changes nothing, if a ring has a vertex on a side, or if pieces would touch.
+/// Then the caller tries again with more steps: all sides move by `steps` billionths of the spacing
+/// (kShiftSpacings in ring_cut.cc), opposite sides in the same direction. If kMostCutSteps attempts
+/// fail, this is a bug.
 /// Cost: as CutAtLine, CountTouchingPairs and RingDepths. Throws Cancelled as ThrowIfCancelled.
-[[nodiscard]] bool CutRings(const RingCutInput& input, RingCutScratch& scratch,
+[[nodiscard]] bool CutRings(const RingCutInput& input, int steps, RingCutScratch& scratch,
                             PlacedVertices& placed, Rings& rings, std::uint64_t& cut_bodies);
+
+/// Whether CutRings would return true. Changes only `scratch`.
+[[nodiscard]] bool CanCutRings(const RingCutInput& input, int steps, RingCutScratch& scratch,
+                               const PlacedVertices& placed, const Rings& rings);
 
 /// Clears interior cells: all cells of components that are gone, and the cells of cut components
 /// that are not strictly inside the window. Cost: linear in tiles.

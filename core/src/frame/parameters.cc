@@ -92,7 +92,6 @@ absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) 
   }
   if (p.slice || of.slice) return refused("must be absent with a slice");
   if (p.isovalue || of.isovalue) return refused("must be absent with an isovalue");
-  if (p.box) return refused("must be absent with a periodic box");
   if (p.boundary == Boundary::kGrains) return refused("must be absent with grains");
   if (p.placement != Placement::kVirtualPlane) {
     return refused("must be absent unless the placement is virtual-plane");

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vertices/measure.h"
+
 namespace partiemc {
 namespace {
 
@@ -11,15 +13,6 @@ constexpr double kSmallestTurn = .4;
 // A side has no curve if the root mean square distance of its points from the curve is larger, in
 // spacings. Another corner of the body may be near.
 constexpr double kLargestMisfit = .05;
-
-double AreaOf(std::uint32_t begin, std::uint32_t end, std::span<const Point> positions) {
-  const Point origin = positions[begin];
-  double twice = 0;
-  for (std::uint32_t k = begin + 1; k + 1 < end; ++k) {
-    twice += Cross(Minus(positions[k], origin), Minus(positions[k + 1], origin));
-  }
-  return twice / 2;
-}
 
 // Whether the points that determine a curve lie near it. `curve` is relative to `vertex`.
 bool Follows(const ArcCurve& curve, const RingPath& path, const Point& vertex, double spacing,
@@ -76,27 +69,69 @@ std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, 
   return is_corner ? std::optional(BodyCorner{*after, *before}) : std::nullopt;
 }
 
-void SumRingAreas(const Rings& body, std::span<const Point> positions, std::vector<double>& areas) {
-  areas.clear();
-  for (std::size_t ring = 0; ring < body.RingCount(); ++ring) {
-    areas.push_back(AreaOf(body.offsets[ring], body.offsets[ring + 1], positions));
+double RingAreas::AreaOf(const Rings& body, std::uint32_t ring, const PhaseImages& images,
+                         std::span<const Point> positions) {
+  const std::uint32_t begin = body.offsets[ring], end = body.offsets[ring + 1];
+  if (images.IsRingCut(ring)) {
+    ring_.clear();
+    for (const Point& at : positions.subspan(begin, end - begin)) {
+      ring_.insert(ring_.end(), {at.x, at.y});
+    }
+    return MeasureInWindow(ring_, images.window()).area;
+  }
+  const Point origin = positions[begin];
+  double twice = 0;
+  for (std::uint32_t k = begin + 1; k + 1 < end; ++k) {
+    twice += Cross(Minus(positions[k], origin), Minus(positions[k + 1], origin));
+  }
+  return twice / 2;
+}
+
+double RingAreas::LengthOf(const Rings& body, std::uint32_t ring, const PhaseImages& images,
+                           std::span<const Point> positions) const {
+  const std::uint32_t begin = body.offsets[ring], end = body.offsets[ring + 1];
+  const bool is_cut = images.IsRingCut(ring);
+  double length = 0;
+  for (std::uint32_t k = begin; k < end; ++k) {
+    const Point &from = positions[k], &to = positions[k + 1 == end ? begin : k + 1];
+    length += is_cut ? LengthInWindow(from, to, images.window()) : Length(Minus(to, from));
+  }
+  return length;
+}
+
+void RingAreas::Measure(const Rings& body, const PhaseImages& images,
+                        std::span<const Point> positions) {
+  groups_.assign(body.RingCount(), {});
+  for (std::uint32_t ring = 0; ring < body.RingCount(); ++ring) {
+    groups_[images.GroupOf(ring)].before += AreaOf(body, ring, images, positions);
   }
 }
 
-void RestoreRingAreas(const Rings& body, std::span<const double> areas, double limit,
-                      std::span<std::uint8_t> has_moved, SharedPoints& points) {
-  for (std::size_t ring = 0; ring < body.RingCount(); ++ring) {
-    const std::uint32_t begin = body.offsets[ring], end = body.offsets[ring + 1];
-    const std::span<std::uint8_t> moved = has_moved.subspan(begin, end - begin);
-    if (std::ranges::find(moved, kMovedCorner) == moved.end()) continue;
-    double length = 0;
-    for (std::uint32_t k = begin; k < end; ++k) {
-      length += Length(Minus(points.position[k + 1 == end ? begin : k + 1], points.position[k]));
-    }
-    if (!(length > 0)) continue;
-    const double lost = areas[ring] - AreaOf(begin, end, points.position);
-    const double offset = std::clamp(lost / length, -limit, limit);
-    for (std::uint32_t k = begin; k < end; ++k) {
+void RingAreas::Restore(const Rings& body, const PhaseImages& images, double limit,
+                        std::span<std::uint8_t> has_moved, SharedPoints& points) {
+  const auto moved_of = [&](std::uint32_t ring) {
+    return has_moved.subspan(body.offsets[ring], body.offsets[ring + 1] - body.offsets[ring]);
+  };
+  for (Group& group : groups_) {
+    group.now = group.length = 0;
+    group.has_corner = false;
+  }
+  for (std::uint32_t ring = 0; ring < body.RingCount(); ++ring) {
+    const auto moved = moved_of(ring);
+    groups_[images.GroupOf(ring)].has_corner |=
+        std::ranges::find(moved, kMovedCorner) != moved.end();
+  }
+  for (std::uint32_t ring = 0; ring < body.RingCount(); ++ring) {
+    Group& group = groups_[images.GroupOf(ring)];
+    if (!group.has_corner) continue;
+    group.now += AreaOf(body, ring, images, points.position);
+    group.length += LengthOf(body, ring, images, points.position);
+  }
+  for (std::uint32_t ring = 0; ring < body.RingCount(); ++ring) {
+    const Group& group = groups_[images.GroupOf(ring)];
+    if (!group.has_corner || !(group.length > 0)) continue;
+    const double offset = std::clamp((group.before - group.now) / group.length, -limit, limit);
+    for (std::uint32_t k = body.offsets[ring]; k < body.offsets[ring + 1]; ++k) {
       const VertexNormal& normal = points.normal[k];
       points.position[k] =
           Plus(points.position[k], Times({double{normal.x}, double{normal.y}}, offset));

@@ -11,6 +11,7 @@
 #include "partiemc/result.h"
 #include "phases/arc_curve.h"
 #include "phases/interfaces.h"
+#include "phases/phase_images.h"
 
 namespace partiemc {
 
@@ -45,15 +46,35 @@ struct BodyCorner {
 std::optional<BodyCorner> CornerOf(const RingPath& ahead, const RingPath& back, const Point& vertex,
                                    double spacing, std::span<const Point> positions);
 
-/// Sets `areas` to the signed area of each ring of the body, holes negative, in squared units of
-/// `positions`.
-void SumRingAreas(const Rings& body, std::span<const Point> positions, std::vector<double>& areas);
+/// Keeps the areas of the rings of the body while their corners move. The outer rings of a body
+/// that will be cut count as one, by their parts in the window, so that the outline continues
+/// across the faces. Reuses its memory.
+class RingAreas {
+ public:
+  /// Measures the rings. `images`: after Build.
+  void Measure(const Rings& body, const PhaseImages& images, std::span<const Point> positions);
 
-/// For each ring with a corner: moves all its vertices along their normals by one offset, at most
-/// `limit` cells in both directions. The offset restores, to first order, the area of the ring in
-/// `areas`. `has_moved`: by vertex, kMovedCorner at corners; sets the elements of such a ring that
-/// are 0 to kMoved.
-void RestoreRingAreas(const Rings& body, std::span<const double> areas, double limit,
-                      std::span<std::uint8_t> has_moved, SharedPoints& points);
+  /// For each ring with a corner: moves all its vertices along their normals by one offset, at most
+  /// `limit` cells in both directions. The offset restores the area, to first order. `has_moved`:
+  /// by vertex, kMovedCorner at corners; sets the elements of such a ring that are 0 to kMoved.
+  /// Requires: Measure.
+  void Restore(const Rings& body, const PhaseImages& images, double limit,
+               std::span<std::uint8_t> has_moved, SharedPoints& points);
+
+ private:
+  // Of the group of a ring, at its first ring (PhaseImages::ring_groups).
+  struct Group {
+    double before = 0, now = 0, length = 0;  // Areas, in squared cells; length, in cells.
+    bool has_corner = false;
+  };
+
+  double AreaOf(const Rings& body, std::uint32_t ring, const PhaseImages& images,
+                std::span<const Point> positions);
+  double LengthOf(const Rings& body, std::uint32_t ring, const PhaseImages& images,
+                  std::span<const Point> positions) const;
+
+  std::vector<Group> groups_;
+  std::vector<double> ring_;  // Points of a ring, interleaved.
+};
 
 }  // namespace partiemc

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "base/bits.h"
+#include "vertices/measure.h"
 
 namespace partiemc {
 namespace {
@@ -18,21 +20,37 @@ constexpr double kTolerance = 1e-6;
 struct Areas {
   std::span<const PhaseRings> phases;
   const Interfaces& interfaces;
+  const PhaseImages& images;
   PhaseAreaScratch& s;
 
   std::uint32_t LeftOf(const PhaseArc& arc) const {
-    return s.first_region[arc.left - 1u] + arc.left_component;
+    return images.RootOf(images.RegionOf(arc.left - 1u, arc.left_component));
   }
   std::uint32_t RightOf(const PhaseArc& arc) const {
-    return s.first_region[arc.right - 1u] + arc.right_component;
+    return images.RootOf(images.RegionOf(arc.right - 1u, arc.right_component));
   }
 };
+
+// The area of the part of a ring in the window.
+double AreaInWindow(std::span<const std::uint32_t> ring, const SharedPoints& points, Areas& a) {
+  a.s.ring.clear();
+  for (const std::uint32_t point : ring) {
+    a.s.ring.push_back(points.position[point].x);
+    a.s.ring.push_back(points.position[point].y);
+  }
+  return MeasureInWindow(a.s.ring, a.images.window()).area;
+}
 
 void SumAreas(const SharedPoints& points, Areas& a) {
   for (std::size_t phase = 0; phase < a.phases.size(); ++phase) {
     const PhaseRings& rings = a.phases[phase];
     for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
       const std::span<const std::uint32_t> of = rings.RingPoints(ring);
+      const std::uint32_t region = a.images.RegionOf(phase, rings.topology.component_of_ring[ring]);
+      if (a.images.IsCut(region)) {
+        a.s.area[a.images.RootOf(region)] += AreaInWindow(of, points, a);
+        continue;
+      }
       const Point origin = points.position[of[0]];
       double twice = 0;
       for (std::size_t k = 1; k + 1 < of.size(); ++k) {
@@ -40,7 +58,7 @@ void SumAreas(const SharedPoints& points, Areas& a) {
         const Point& c = points.position[of[k + 1]];
         twice += (b.x - origin.x) * (c.y - origin.y) - (c.x - origin.x) * (b.y - origin.y);
       }
-      a.s.area[a.s.first_region[phase] + rings.topology.component_of_ring[ring]] += twice / 2;
+      a.s.area[region] += twice / 2;
     }
   }
 }
@@ -49,10 +67,15 @@ void MeasureArcs(const SharedPoints& points, Areas& a) {
   a.s.length.clear();
   for (const PhaseArc& arc : a.interfaces.arcs) {
     const std::span<const std::uint32_t> inner = a.interfaces.InnerPoints(arc);
+    const bool is_cut = a.images.IsCut(a.LeftOf(arc));
     double length = 0;
     const auto add = [&](std::uint32_t from, std::uint32_t to) {
       const Point& p = points.position[from];
       const Point& q = points.position[to];
+      if (is_cut) {
+        length += LengthInWindow(p, q, a.images.window());
+        return;
+      }
       length += std::sqrt((q.x - p.x) * (q.x - p.x) + (q.y - p.y) * (q.y - p.y));
     };
     for (std::size_t k = 0; k + 1 < inner.size(); ++k) add(inner[k], inner[k + 1]);
@@ -167,58 +190,66 @@ std::optional<RegionOfTile> OnlyRegion(const PhaseField& field, std::span<const 
 
 }  // namespace
 
-void SumRegions(const ParticleBins& bins, const Scale& scale, const PhaseField& field,
-                std::span<const PhaseLabel> labels, const PhaseMap& map,
-                std::span<const PhaseRings> phases, PhaseAreaScratch& s) {
-  s.first_region.clear();
-  std::uint32_t count = 0;
-  for (const PhaseRings& phase : phases) {
-    s.first_region.push_back(count);
-    count += phase.topology.components.size();
-  }
-  s.count.assign(count, 0);
-  s.volume.assign(count, 0);
+void SumRegions(const RegionInput& input, PhaseImages& images, PhaseAreaScratch& s) {
+  const ParticleBins& bins = input.bins;
+  const Scale& scale = input.scale;
+  s.count.assign(images.RegionCount(), 0);
+  s.volume.assign(images.RegionCount(), 0);
+  const bool has_copies = images.HasCopies();
+  s.region_of.assign(has_copies ? input.labels.size() : 0, kNoComponent);
   const double square = scale.spacing * scale.spacing, per_weight = 1 / scale.weight_per_volume;
   const auto volume_of = [&](std::uint32_t k) {
     if (!bins.size.empty()) return bins.size[k] * bins.size[k] * square;
     return (bins.weight.empty() ? scale.uniform_weight : double{bins.weight[k]}) * per_weight;
   };
-  const auto region_of = [&](PhaseLabel label, std::uint32_t component) {
-    return s.first_region[label - 1u] + component;
-  };
   for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
     const std::uint32_t first = bins.offsets[tile], last = bins.offsets[tile + 1];
     if (first == last) continue;
-    if (const auto only = OnlyRegion(field, phases, tile)) {
-      const std::uint32_t region = region_of(only->label, only->component);
+    const auto only = OnlyRegion(input.field, input.phases, tile);
+    if (only && !has_copies) {
+      const std::uint32_t region = images.RegionOf(only->label - 1u, only->component);
       s.count[region] += last - first;
       for (std::uint32_t k = first; k < last; ++k) s.volume[region] += volume_of(k);
       continue;
     }
     for (std::uint32_t k = first; k < last; ++k) {
       const BinnedParticle& particle = bins.particles[k];
-      const auto component_in = [&](PhaseLabel label) {
-        const PhaseRings& phase = phases[label - 1u];
-        return phase.topology.components.ComponentOf(bins.tiles, phase.crossings, tile, particle.x,
-                                                     particle.y);
+      const auto region_in = [&](PhaseLabel label) {
+        const PhaseRings& phase = input.phases[label - 1u];
+        const std::uint32_t component =
+            only && only->label == label
+                ? only->component
+                : phase.topology.components.ComponentOf(bins.tiles, phase.crossings, tile,
+                                                        particle.x, particle.y);
+        return component == kNoComponent ? kNoComponent : images.RegionOf(label - 1u, component);
       };
-      PhaseLabel label = labels[particle.source];
-      std::uint32_t component = component_in(label);
-      if (component != kNoComponent) {
-        ++s.count[region_of(label, component)];
+      PhaseLabel label = input.labels[particle.source];
+      std::uint32_t region = region_in(label);
+      if (region != kNoComponent) {
+        if (has_copies) s.region_of[particle.source] = region;
+        s.count[region] += images.Counts(particle.source, region) ? 1 : 0;
       } else {
-        label = map.At(Normalise(bins.tiles, tile, static_cast<int>(particle.x + .5F),
-                                 static_cast<int>(particle.y + .5F)));
-        if (label != kNoPhase) component = component_in(label);
+        label = input.map.At(Normalise(bins.tiles, tile, static_cast<int>(particle.x + .5F),
+                                       static_cast<int>(particle.y + .5F)));
+        if (label != kNoPhase) region = region_in(label);
       }
-      if (component != kNoComponent) s.volume[region_of(label, component)] += volume_of(k);
+      if (region != kNoComponent && images.Counts(particle.source, region)) {
+        s.volume[region] += volume_of(k);
+      }
     }
+  }
+  if (!has_copies) return;
+  images.JoinImages(input.originals, s.region_of);
+  for (std::uint32_t region = 0; region < images.RegionCount(); ++region) {
+    const std::uint32_t root = images.RootOf(region);
+    if (root != region) s.volume[root] += std::exchange(s.volume[region], 0);
   }
 }
 
-void MatchPhaseAreas(std::span<const PhaseRings> phases, const Interfaces& interfaces, double limit,
-                     PhaseAreaScratch& scratch, SharedPoints& points) {
-  Areas a{phases, interfaces, scratch};
+void MatchPhaseAreas(std::span<const PhaseRings> phases, const Interfaces& interfaces,
+                     const PhaseImages& images, double limit, PhaseAreaScratch& scratch,
+                     SharedPoints& points) {
+  Areas a{phases, interfaces, images, scratch};
   scratch.area.assign(scratch.volume.size(), 0);
   SumAreas(points, a);
   MeasureArcs(points, a);

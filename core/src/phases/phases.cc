@@ -6,7 +6,6 @@
 
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
-#include "phases/body_corner.h"
 #include "phases/junction_angles.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
@@ -59,7 +58,7 @@ void CountParticles(Phases& p) {
   for (std::size_t k = 0; k < p.rings.size(); ++k) {
     RingTopology& topology = p.rings[k].topology;
     for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-      const std::uint32_t region = p.areas.first_region[k] + topology.component_of_ring[ring];
+      const std::uint32_t region = p.images.RegionOf(k, topology.component_of_ring[ring]);
       const bool is_hole = topology.outer_of[ring] != kNoRing;
       topology.particle_count[ring] = is_hole ? 0 : p.areas.count[region];
     }
@@ -99,6 +98,10 @@ absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& para
   return status;
 }
 
+void LabelCopies(std::span<const std::uint32_t> originals, Phases& p) {
+  for (const std::uint32_t original : originals) p.labels.push_back(p.labels[original]);
+}
+
 void MapPhases(const PhaseInput& input, Phases& p) {
   p.field.Build(input.bins, input.scale, p.labels);
   p.map.Build(input.bins.tiles, input.crossings, p.field);
@@ -120,17 +123,20 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   FindInterfacePoints(directory, p.map, p.field, p.numbers, p.vertices, p.points);
   CollectArcs(directory, p.map, p.numbers, p.rings, p.interfaces);
   SmoothInterfaces(input.scale, input.variant.constants, p.interfaces, p.points);
-  SumRingAreas(body, p.points.position, p.ring_areas);
+  p.images.Build(input.percolation, outline, input.scale.cell_size, p.rings);
+  p.ring_areas.Measure(body, p.images, p.points.position);
   const auto move_junctions = [&] {
     MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
-    RestoreRingAreas(body, p.ring_areas, kCornerLimit * input.scale.spacing, p.junctions.has_moved,
-                     p.points);
+    p.ring_areas.Restore(body, p.images, kCornerLimit * input.scale.spacing, p.junctions.has_moved,
+                         p.points);
   };
   move_junctions();
-  SumRegions(input.bins, input.scale, p.field, p.labels, p.map, p.rings, p.areas);
+  SumRegions({input.bins, input.scale, p.field, p.map, p.labels, input.originals, p.rings},
+             p.images, p.areas);
   CountParticles(p);
   if (input.parameters.spacing.has_value() || !input.frame.volumes.empty()) {
-    MatchPhaseAreas(p.rings, p.interfaces, kAreaLimit * input.scale.spacing, p.areas, p.points);
+    MatchPhaseAreas(p.rings, p.interfaces, p.images, kAreaLimit * input.scale.spacing, p.areas,
+                    p.points);
     move_junctions();
   }
   p.is_junction.assign(p.points.position.size(), 0);

@@ -9,10 +9,12 @@
 #include "partiemc/frame.h"
 #include "partiemc/parameters.h"
 #include "partiemc/result.h"
+#include "phases/body_corner.h"
 #include "phases/interfaces.h"
 #include "phases/junctions.h"
 #include "phases/phase_areas.h"
 #include "phases/phase_field.h"
+#include "phases/phase_images.h"
 #include "phases/phase_map.h"
 #include "phases/phase_repair.h"
 #include "phases/phase_rings.h"
@@ -23,7 +25,7 @@ namespace partiemc {
 /// The phases of a frame. Reuses its memory.
 struct Phases {
   std::vector<float> known;        ///< By label less one: the phase of the section.
-  std::vector<PhaseLabel> labels;  ///< By particle of the frame.
+  std::vector<PhaseLabel> labels;  ///< By particle of the frame, then by copy.
   PhaseField field;
   PhaseMap map;
   BodyVertices vertices;
@@ -32,7 +34,8 @@ struct Phases {
   SharedPoints points;
   std::vector<double> world, world_roots;      ///< By shared point, interleaved, in world units.
   std::vector<std::uint64_t> particle_counts;  ///< By ring of the body.
-  std::vector<double> ring_areas;              ///< By ring of the body, in squared cells.
+  RingAreas ring_areas;
+  PhaseImages images;
   Interfaces interfaces;
   PhaseTraceScratch trace;
   JunctionScratch junctions;
@@ -51,6 +54,8 @@ struct PhaseInput {
   const Crossings& crossings;
   const RingTopology& topology;
   const RingVertices& vertices;
+  const Percolation* percolation = nullptr;       ///< Null without copies of particles.
+  std::span<const std::uint32_t> originals = {};  ///< By copy: its particle.
 };
 
 /// The number of sections that have a phase. The first one has the label 1, and so on.
@@ -66,7 +71,10 @@ inline bool HasPhases(const ReconstructionParameters& parameters) {
 absl::Status TakePhases(const Frame& frame, const ReconstructionParameters& parameters,
                         Phases& phases, std::vector<Attribute>& others);
 
-/// Labels the nodes of the body by phase. Requires: TakePhases.
+/// Gives copies of particles the labels of their originals. Requires: TakePhases.
+void LabelCopies(std::span<const std::uint32_t> originals, Phases& phases);
+
+/// Labels the nodes of the body by phase. Requires: TakePhases; with copies, LabelCopies.
 void MapPhases(const PhaseInput& input, Phases& phases);
 
 /// Number of points that interfaces add to the vertices of the body: on edges and in cells.

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -43,6 +44,45 @@ TEST(PhasesReplay, EachPhaseIsASectionWithItsArea) {
     EXPECT_NEAR(std::stod(areas[1]), 200, 1);
   }
   EXPECT_EQ(digests[0], digests[1]);
+}
+
+// A box of 30 x 24 with a drop of type 2 across its corner.
+TEST(PhasesReplay, PhasesAreCutAtThePeriodicBox) {
+  const support::TemporaryFolder folder;
+  const std::string csv = folder.Path("frame.csv"), stats = folder.Path("s.csv");
+  std::ofstream file(csv);
+  file << "x,y,type\n";
+  int count = 0;
+  for (int j = 0; j < 24; ++j) {
+    for (int i = 0; i < 30; ++i) {
+      const bool is_drop = std::hypot(i < 15 ? i : i - 30, j < 12 ? j : j - 24) < 6;
+      count += is_drop ? 1 : 0;
+      file << i + .5 << "," << j + .5 << "," << (is_drop ? 2 : 1) << "\n";
+    }
+  }
+  file.close();
+  ServerProgram server;
+  for (const bool wraps : {false, true}) {
+    std::vector<std::vector<std::string>> digests;
+    for (const std::vector<std::string>& where :
+         {std::vector<std::string>{"--local"}, {"--server", server.address()}}) {
+      std::vector<std::string> arguments = {
+          "replay", csv,     "--spacing", "1",       "--phases", "type=1,2", "--periodic",
+          "x,y",    "--box", "0,30,0,24", "--check", "--stats",  stats};
+      if (wraps) arguments.push_back("--wrap");
+      arguments.insert(arguments.end(), where.begin(), where.end());
+      const Ran ran = RunPartiemc(arguments);
+      ASSERT_EQ(ran.exit_code, 0) << ran.error;
+      digests.push_back(Column(Content(stats), "rings_digest"));
+      const auto areas = Column(Content(stats), "area");
+      ASSERT_EQ(areas.size(), 3u);
+      EXPECT_NEAR(std::stod(areas[0]), 720, 1e-6);
+      EXPECT_NEAR(std::stod(areas[1]) + std::stod(areas[2]), 720, 1e-6);
+      EXPECT_NEAR(std::stod(areas[2]), count, .01 * count);
+      EXPECT_EQ(Column(Content(stats), "polylines")[2], "4");
+    }
+    EXPECT_EQ(digests[0], digests[1]);
+  }
 }
 
 TEST(PhasesReplay, PhasesOfNoParticleAreReported) {
