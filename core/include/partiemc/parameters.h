@@ -279,7 +279,8 @@ struct ReconstructionParameters {
   /// is cut at the faces (Rings::cuts, Surface::cuts). `farthest-particle` refuses such a frame
   /// (PERCOLATES). A length must be at least four kernel radii, in each frame also those of its
   /// largest particle, and at most kMostSpacings spacings. For outlines, only axes of the plane of
-  /// the particles may be periodic. Excludes slices and phases. Frame::box may replace it.
+  /// the particles may be periodic. Excludes slices. Phases are cut with their body. Frame::box may
+  /// replace it.
   std::optional<PeriodicBox> box = std::nullopt;
 
   /// If present, positions are filtered from frame to frame against white noise (core/NOISE.md).

@@ -62,7 +62,7 @@ class RingAreas {
                std::span<std::uint8_t> has_moved, SharedPoints& points);
 
  private:
-  // Of the group of a ring, at its first ring (PhaseImages::ring_groups).
+  // Sums over a group of rings (PhaseImages::GroupOf).
   struct Group {
     double before = 0, now = 0, length = 0;  // Areas, in squared cells; length, in cells.
     bool has_corner = false;
@@ -73,8 +73,8 @@ class RingAreas {
   double LengthOf(const Rings& body, std::uint32_t ring, const PhaseImages& images,
                   std::span<const Point> positions) const;
 
-  std::vector<Group> groups_;
-  std::vector<double> ring_;  // Points of a ring, interleaved.
+  std::vector<Group> groups_;  // By ring; only the first ring of a group has its sums.
+  std::vector<double> ring_;   // Points of a ring, interleaved.
 };
 
 }  // namespace partiemc

@@ -24,8 +24,9 @@ class PhaseImages {
              std::span<const PhaseRings> phases);
 
   /// Joins the regions that will be cut and share a particle: they are images of one region.
-  /// `region_of`: by particle of the frame, its region of its own phase, or kNoComponent.
-  /// `originals`: by copy, its particle. Changes `region_of`. Cost: linear in particles.
+  /// `region_of`: by particle of the frame, the region of its phase in which it lies, or
+  /// kNoComponent. `originals`: by copy, its particle. Changes `region_of`. Cost: linear in
+  /// particles.
   void JoinImages(std::span<const std::uint32_t> originals, std::span<std::uint32_t> region_of);
 
   std::uint32_t RegionCount() const { return first_.back(); }
@@ -45,8 +46,8 @@ class PhaseImages {
   }
   /// The box along the axes along which bodies percolate, in cells.
   const Window& window() const { return window_; }
-  /// The first of the outer rings of a body that will be cut, by one of them. Other rings have a
-  /// group of their own. Rings are numbered as in Rings.
+  /// The group of a ring of the body, by its first ring. The outer rings of a body that will be cut
+  /// are a group. Each other ring is one, too.
   std::uint32_t GroupOf(std::uint32_t ring) const {
     return ring_groups_.empty() || ring_groups_[ring] == kNoRing ? ring : ring_groups_[ring];
   }
