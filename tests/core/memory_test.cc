@@ -57,8 +57,8 @@ std::vector<MemoryCase> MemoryCases(Carried carried) {
   support::Random random(3);
   add("corners of tiles", spread(90, 64));
   add("middles of tiles", spread(60, 96, 16));
-  add("one body", support::Disc(300));
-  add("one body, grid", support::Disc(300), {.fill = Fill::kGrid});
+  add("one body", support::Disc(200));
+  add("one body, grid", support::Disc(200), {.fill = Fill::kGrid});
   add("islands", islands);
   add("drops", spread(150, 5));
   add("drops of a fine lattice", spread(60, 20), {.kernel_radius = 8, .cell_size = .25});
@@ -72,21 +72,21 @@ std::vector<MemoryCase> MemoryCases(Carried carried) {
     particles.volumes = VaryingVolumes(particles.size());
     return particles;
   };
-  add("body of own sizes", sized(support::Disc(300)), {.sizes = Sizes::kOwn});
+  add("body of own sizes", sized(support::Disc(200)), {.sizes = Sizes::kOwn});
   add("drops of own sizes", sized(spread(150, 5)), {.sizes = Sizes::kOwn});
   const auto phased = [](Particles particles) {
     particles.phases = StripedPhases(particles);
     return particles;
   };
   const std::vector<Section> phases = {{.phase = 1}, {.phase = 2}};
-  add("body of two phases", phased(support::Disc(300)), {.sections = phases});
+  add("body of two phases", phased(support::Disc(200)), {.sections = phases});
   add("drops of two phases", phased(spread(150, 5)), {.sections = phases});
-  const std::vector<Wall> tank = {support::PolygonWall(0, 0, 280, 1000, 0, true)};
-  add("body in a round tank", support::Disc(300), {.walls = tank});
+  const std::vector<Wall> tank = {support::PolygonWall(0, 0, 187, 1000, 0, true)};
+  add("body in a round tank", support::Disc(200), {.walls = tank});
   add("drops at walls", spread(150, 5),
       {.walls = {{{0, 7, 1, 7}}, {{7, 1, 7, 0}}, {{0, 0, 1, 1}}}});
   add("drops among wall particles", phased(spread(150, 1.2)), {.wall_phases = {2}});
-  add("body among wall particles", phased(support::Disc(300)), {.wall_phases = {2}});
+  add("body among wall particles", phased(support::Disc(200)), {.wall_phases = {2}});
   const ReconstructionParameters grains{
       .sizes = Sizes::kOwn, .boundary = Boundary::kGrains, .cell_size = kCellOfGrains};
   add("body of grains", sized(support::Disc(60)), grains);
