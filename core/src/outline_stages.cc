@@ -341,7 +341,7 @@ absl::Status FillOutline(const OutlineTask& task, const Frame& frame, const Scal
                  b.choice, b.topology);
     percolation =
         Percolation{prepared.window, static_cast<std::uint32_t>(prepared.lifted.particles),
-                    b.choice.fates, b.choice.bodies};
+                    b.choice.fates, b.choice.bodies, prepared.reach};
   }
   const bool is_placed = InStage(observer, Stage::kVertices, [&] {
     b.next_area_offset = previous.area_offset;

@@ -64,8 +64,9 @@ inline constexpr std::uint64_t kBytesPerWallLine = 300;
 inline constexpr std::uint64_t kBytesAtLeast = 1 << 20;
 
 /// Upper bound of the memory of a new Workspace, Result and State after frames of this size. Above
-/// a few MB, it is at most 2.2 times the actual memory (tests/core/allocation_test.cc), or 4 times
-/// if attributes are smooth, because their meshes are small.
+/// a few MB, it is at most 2.5 times the actual memory in tests/core/memory_test.cc, or 4 times if
+/// attributes are smooth, because their meshes are small. Phases with long interfaces: up to 6
+/// times.
 inline std::uint64_t WorkspaceBytes(const FrameSize& size) {
   std::uint64_t bytes = kBytesAtLeast + kBytesPerParticle * size.particles +
                         kBytesPerTile * size.tiles + kBytesPerSegment * size.segments +

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <utility>
@@ -15,7 +16,9 @@
 #include "core/boxes.h"
 #include "core/phases_in_boxes.h"
 #include "partiemc/partiemc.h"
+#include "support/random.h"
 #include "support/reconstruct.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -283,6 +286,51 @@ TEST(PhasesPeriodic, DiscsOfTwoPhasesAreTheSameAcrossACorner) {
               whole.largest(), area.largest(), interface.largest());
   EXPECT_LT(area.largest(), 1e-6);
   EXPECT_LT(interface.largest(), 1e-6);
+}
+
+// The particles of each region of a phase.
+std::vector<std::uint64_t> CountsOf(const Rings& rings) {
+  std::vector<std::uint64_t> counts;
+  for (const RingMeasures& ring : rings.measures) {
+    if (ring.particle_count > 0) counts.push_back(ring.particle_count);
+  }
+  std::ranges::sort(counts);
+  return counts;
+}
+
+// Near the end of the copies, a drop may be joined with another one.
+TEST(PhasesPeriodic, RegionsKeepTheirParticlesAnywhere) {
+  constexpr double kWidth = 19, kHeight = 15;
+  for (std::uint64_t seed = 1; seed <= support::Tries(100u); ++seed) {
+    support::Random random(seed);
+    std::vector<std::array<double, 3>> drops(1 + random.Below(4));
+    for (auto& [x, y, radius] : drops) {
+      x = random.Uniform(0, kWidth);
+      y = random.Uniform(0, kHeight);
+      radius = random.Uniform(1.2, 5);
+    }
+    const Particles scene = Labelled(19, 15, .1, [&](double x, double y) {
+      return std::ranges::any_of(drops,
+                                 [&](const auto& drop) {
+                                   return std::hypot(std::remainder(x - drop[0], kWidth),
+                                                     std::remainder(y - drop[1], kHeight)) <
+                                          drop[2];
+                                 })
+                 ? 2
+                 : 1;
+    });
+    std::vector<std::vector<std::uint64_t>> expected;
+    // Whole cells, so that the lattice lies alike.
+    for (const auto& [x, y] : {std::pair(0., 0.), {-12., 0.}, {17., 14.}, {5., 9.}}) {
+      SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << x << ", " << y);
+      const PeriodicBox box = BoxOf(kWidth, kHeight, x, y);
+      const Result result = ReconstructOnce(PhasesIn(box, 2), Wrapped(scene, box));
+      std::vector<std::vector<std::uint64_t>> counts;
+      for (const Result& phase : result.sections) counts.push_back(CountsOf(phase.rings));
+      if (expected.empty()) expected = counts;
+      EXPECT_EQ(counts, expected);
+    }
+  }
 }
 
 }  // namespace

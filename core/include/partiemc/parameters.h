@@ -92,7 +92,7 @@ struct Section {
   /// 2^24 in magnitude. Sections with phases divide the outline of the stream: two phases share the
   /// points of their interface. All other particles are one more phase, without a result. No two
   /// sections have the same phase. Requires Placement::kVirtualPlane; excludes surfaces, slices,
-  /// Boundary::kGrains, `box`, and isovalues of this section or of the stream.
+  /// Boundary::kGrains, walls, and isovalues of this section or of the stream.
   std::optional<std::int32_t> phase = std::nullopt;
 
   friend bool operator==(const Section&, const Section&) = default;

@@ -52,10 +52,10 @@ void RemoveGoneRings(const Percolation& percolation, const RingTopology& topolog
 /// parallel to the points, and sets `cut_bodies` to the number of bodies with a ring that is cut.
 ///
 /// Returns false, and changes nothing, if a ring has a vertex on a side, or if pieces would touch.
-/// Then the caller tries again with more steps: all sides move by `steps` billionths of the spacing
-/// (kShiftSpacings in ring_cut.cc), opposite sides in the same direction. If kMostCutSteps attempts
-/// fail, this is a bug.
-/// Cost: as CutAtLine, CountTouchingPairs and RingDepths. Throws Cancelled as ThrowIfCancelled.
+/// Then the caller tries again with more steps: all sides move by `steps` billionths of the
+/// spacing, plus `steps` times 8 units in the last place of the farthest coordinate, opposite sides
+/// in the same direction. If kMostCutSteps attempts fail, this is a bug. Cost: as CutAtLine,
+/// CountTouchingPairs and RingDepths. Throws Cancelled as ThrowIfCancelled.
 [[nodiscard]] bool CutRings(const RingCutInput& input, int steps, RingCutScratch& scratch,
                             PlacedVertices& placed, Rings& rings, std::uint64_t& cut_bodies);
 

@@ -205,6 +205,8 @@ void SumRegions(const RegionInput& input, PhaseImages& images, PhaseAreaScratch&
   for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
     const std::uint32_t first = bins.offsets[tile], last = bins.offsets[tile + 1];
     if (first == last) continue;
+    const Point origin{static_cast<double>(std::int64_t{bins.tiles[tile].x} << kTileShift),
+                       static_cast<double>(std::int64_t{bins.tiles[tile].y} << kTileShift)};
     const auto only = OnlyRegion(input.field, input.phases, tile);
     if (only && !has_copies) {
       const std::uint32_t region = images.RegionOf(only->label - 1u, only->component);
@@ -226,7 +228,10 @@ void SumRegions(const RegionInput& input, PhaseImages& images, PhaseAreaScratch&
       PhaseLabel label = input.labels[particle.source];
       std::uint32_t region = region_in(label);
       if (region != kNoComponent) {
-        if (has_copies) s.region_of[particle.source] = region;
+        const Point at{origin.x + particle.x, origin.y + particle.y};
+        if (has_copies && images.DecidesImages(particle.source, at)) {
+          s.region_of[particle.source] = region;
+        }
         s.count[region] += images.Counts(particle.source, region) ? 1 : 0;
       } else {
         label = input.map.At(Normalise(bins.tiles, tile, static_cast<int>(particle.x + .5F),

@@ -31,7 +31,7 @@ struct RegionInput {
   const Scale& scale;
   const PhaseField& field;
   const PhaseMap& map;
-  std::span<const PhaseLabel> labels;        ///< By particle of the frame.
+  std::span<const PhaseLabel> labels;        ///< By particle of the frame, then by copy.
   std::span<const std::uint32_t> originals;  ///< By copy: its particle.
   std::span<const PhaseRings> phases;
 };

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "base/bits.h"
 #include "base/cancellation.h"
@@ -30,8 +31,10 @@ void PhaseImages::Build(const Percolation* body, const BodyOutline& outline, dou
   if (!has_copies_) return;
   particles_ = body->particles;
   window_ = body->window;
-  for (auto& axis : window_.axes) {
+  for (std::size_t k = 0; k < window_.axes.size(); ++k) {
+    std::optional<PeriodicAxis>& axis = window_.axes[k];
     if (axis) axis = PeriodicAxis{axis->origin / cell_size, axis->length / cell_size};
+    reach_[k] = body->reach[k] / cell_size;
   }
   fates_.resize(RegionCount());
   for (std::size_t k = 0; k < phases.size(); ++k) {
@@ -61,6 +64,18 @@ void PhaseImages::GroupRings(const Percolation& body, const BodyOutline& outline
     if (first == kNoRing) first = number;
     ring_groups_[number] = first;
   }
+}
+
+bool PhaseImages::DecidesImages(std::uint32_t source, const Point& at) const {
+  if (source < particles_) return true;
+  const std::array<double, 2> coordinates{at.x, at.y};
+  for (std::size_t k = 0; k < coordinates.size(); ++k) {
+    const std::optional<PeriodicAxis>& axis = window_.axes[k];
+    if (!axis) continue;
+    const double above = coordinates[k] - axis->origin;
+    if (above < -reach_[k] || above > axis->length + reach_[k]) return false;
+  }
+  return true;
 }
 
 void PhaseImages::JoinImages(std::span<const std::uint32_t> originals,

@@ -2,6 +2,7 @@
 // "Periodic boxes").
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,8 +26,8 @@ class PhaseImages {
 
   /// Joins the regions that will be cut and share a particle: they are images of one region.
   /// `region_of`: by particle of the frame, the region of its phase in which it lies, or
-  /// kNoComponent. `originals`: by copy, its particle. Changes `region_of`. Cost: linear in
-  /// particles.
+  /// kNoComponent, also if it does not decide (DecidesImages). `originals`: by copy, its particle.
+  /// Changes `region_of`. Cost: linear in particles.
   void JoinImages(std::span<const std::uint32_t> originals, std::span<std::uint32_t> region_of);
 
   std::uint32_t RegionCount() const { return first_.back(); }
@@ -46,6 +47,10 @@ class PhaseImages {
   }
   /// The box along the axes along which bodies percolate, in cells.
   const Window& window() const { return window_; }
+  /// Whether the region of a particle decides which regions are images of each other. False for
+  /// copies so far from the window that copies around them are missing: their regions may be wrong.
+  /// `at`: the particle's place in cells.
+  bool DecidesImages(std::uint32_t source, const Point& at) const;
   /// The group of a ring of the body, by its first ring. The outer rings of a body that will be cut
   /// are a group. Each other ring is one, too.
   std::uint32_t GroupOf(std::uint32_t ring) const {
@@ -71,6 +76,7 @@ class PhaseImages {
   std::vector<std::uint32_t> ring_groups_;  // By ring of the body: its group, or kNoRing.
   std::vector<std::uint32_t> first_ring_;   // By component of the body. Scratch.
   Window window_;
+  std::array<double, 2> reach_{};  // By axis: Percolation::reach in cells.
 };
 
 /// The length of the part of a segment in a window. An axis that is absent has no ends.

@@ -30,6 +30,8 @@ struct Percolation {
   std::uint32_t particles;                ///< Number of given particles; copies follow them.
   std::span<const Fate> fates;            ///< By component.
   std::span<const std::uint32_t> bodies;  ///< By component: BodyChoice::bodies.
+  /// World units, by axis: farther beyond the window, nodes may miss copies (Prepared::reach).
+  std::array<double, 2> reach{};
 
   /// The outer ring that represents the body of a component.
   std::uint32_t OuterOf(const RingTopology& topology, std::uint32_t component) const {

@@ -20,8 +20,8 @@ namespace partiemc::space {
 enum class BodyFate : std::uint8_t {
   kWhole,  ///< All of it.
   kCut,    ///< The part in the periodic box.
-  /// None, because another image of the same body remains. The vertices of the image are placed,
-  /// so that the surfaces around all images move alike.
+  /// None, because another image of the same body remains. `virtual-plane` places the vertices of
+  /// the image, so that the surfaces around all images move alike. The others drop it before.
   kGone,
 };
 
@@ -34,8 +34,9 @@ struct Body {
   BodyFate fate = BodyFate::kWhole;
   /// Whether this image of a cut body has all particles of the body. Set only in a box that wraps.
   bool is_complete = false;
-  /// For a cut image: the smallest index among all images of the body. Else its own index, from
-  /// DropBodies on. ChooseImages gives all images the particles and the volume of the whole body.
+  /// For a cut image: the smallest index among all images of the body. For a gone image: the image
+  /// that remains. Else its own index. ChooseImages gives all images the particles and the volume
+  /// of the whole body.
   std::uint32_t first_image = kNoIndex;
 };
 

@@ -108,12 +108,12 @@ DroppedBodies DropBodies(const BodyLimits& limits, CleaningScratch& scratch, Bod
         (is_gone && limits.drops_gone) || has_only_images || is_empty || is_spray;
     scratch.new_index[index] = is_dropped ? kNoIndex : kept;
     if (is_dropped) continue;
-    const std::uint32_t first = is_gone ? kept : scratch.new_index[body.first_image];
-    bodies.bodies[kept] = body;
-    bodies.bodies[kept++].first_image = first;
+    bodies.bodies[kept++] = body;
   }
   if (kept == bodies.bodies.size()) return dropped;
   bodies.bodies.resize(kept);
+  // All images of a body have its particles and its volume, so all of them remain or none does.
+  for (Body& body : bodies.bodies) body.first_image = scratch.new_index[body.first_image];
   for (std::uint32_t& body : bodies.body_of_particle) {
     if (body == kNoIndex || body == kDroppedBody) continue;
     const std::uint32_t index = scratch.new_index[body];

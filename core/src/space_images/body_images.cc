@@ -154,7 +154,7 @@ void ChooseImages(const BodyImageInput& input, BodyImageScratch& s, Bodies& bodi
     body.fate = input.wraps || set.best == kNoIndex ? BodyFate::kCut : BodyFate::kGone;
     body.is_complete = input.wraps && IsComplete(input, s.images[index]) &&
                        s.images[index].given + body.copies == set.particles;
-    body.first_image = root;
+    body.first_image = body.fate == BodyFate::kGone ? set.best : root;
   }
 }
 

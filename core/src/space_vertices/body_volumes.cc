@@ -37,12 +37,13 @@ const std::optional<ClipBox>& ClipOf(const BodyVolumes& volumes, const Bodies& b
   return volumes.in_box && bodies.IsCut(body) ? volumes.in_box : volumes.before_walls;
 }
 
-/// Gives all images of a body the sum of their measures, so that they move alike.
+/// Gives all images of a body that is cut the sum of their measures, and gone images the measures
+/// of the image that remains, so that they move alike.
 void ShareMeasures(const Bodies& bodies, BodyVolumes& volumes) {
   if (!volumes.in_box) return;
   for (std::uint32_t body = 0; body < bodies.bodies.size(); ++body) {
     const std::uint32_t first = bodies.bodies[body].first_image;
-    if (first == body) continue;
+    if (first == body || bodies.IsGone(body)) continue;
     volumes.measures[first].area += volumes.measures[body].area;
     volumes.measures[first].volume += volumes.measures[body].volume;
   }
