@@ -13,7 +13,7 @@
 
 namespace partiemc::client {
 
-/// Finds slices that are beside the particles of all frames: probably a wrong coordinate.
+/// Finds slices that are beside the particles of all frames. Their coordinate is probably wrong.
 class ParticlePlaces {
  public:
   ParticlePlaces(const ReplayFlags& flags, const ReconstructionParameters& parameters);
