@@ -39,13 +39,6 @@ double SpacingOfVolumes(std::span<const float> volumes, std::vector<double>& scr
   return std::sqrt(*middle);
 }
 
-// The root mean square of own sizes. Requires: the frame has volumes.
-double SpacingOfSizes(std::span<const float> volumes) {
-  double sum = 0;
-  for (const float volume : volumes) sum += volume;
-  return std::sqrt(sum / static_cast<double>(volumes.size()));
-}
-
 // The spacing for grains: the smallest diameter, or more if the largest would be too large for this
 // spacing or its lattice. Requires: the frame has volumes.
 double SpacingOfGrains(const ReconstructionParameters& parameters, std::span<const float> volumes) {
@@ -86,6 +79,12 @@ absl::StatusOr<std::optional<SpacingEstimate>> OwnSpacing(
 }
 
 }  // namespace
+
+double SpacingOfSizes(std::span<const float> volumes) {
+  double sum = 0;
+  for (const float volume : volumes) sum += volume;
+  return std::sqrt(sum / static_cast<double>(volumes.size()));
+}
 
 absl::StatusOr<std::optional<Lengths>> DecideLengths(const ReconstructionParameters& parameters,
                                                      const Frame& frame, const State& state,

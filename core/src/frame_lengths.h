@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -20,6 +21,9 @@ struct Lengths {
   double spacing, cell_size;
   bool is_provisional = false;  ///< No spacing is given, and no frame so far agreed on one.
 };
+
+/// The root mean square of the sizes of particles with these areas. Requires: at least one.
+double SpacingOfSizes(std::span<const float> volumes);
 
 /// Returns the lengths of a checked frame. The cell size comes from the state, if it has one. The
 /// spacing comes from the parameters, else, with SpacingRule::kFirstFrame, from the state, else

@@ -1,5 +1,6 @@
 #include "frame_walls.h"
 
+#include <algorithm>
 #include <charconv>
 #include <optional>
 #include <string>
@@ -58,9 +59,13 @@ absl::Status OutlineWalls(const FrameWallsInput& input, const Frame& particles, 
                                            memory, b, b.wall_state, b.wall_result);
   if (!status.ok()) return status;
   memory.Done();
-  InStage(input.observer, Stage::kField, [&] {
-    SharpenCorners(input.prepared.lengths->spacing, b.wall_corners, b.wall_result.rings);
-  });
+  // Corners are rounded by the kernels of the wall particles, and by the lattice of the fluid.
+  double spacing = input.prepared.lengths->spacing;
+  if (input.of_walls->sizes == Sizes::kOwn && !particles.volumes.empty()) {
+    spacing = std::max(spacing, SpacingOfSizes(particles.volumes));
+  }
+  InStage(input.observer, Stage::kField,
+          [&] { SharpenCorners(spacing, b.wall_corners, b.wall_result.rings); });
   return absl::OkStatus();
 }
 
@@ -72,7 +77,8 @@ absl::Status FindImages(const FrameWallsInput& input, FrameMemory& memory, Works
       CheckWallsInBox(parameters.walls, *input.fluid.box, AxesOf(input.fluid, parameters.plane));
   // Without lengths there is no outline.
   if (!status.ok() || !input.prepared.lengths) return status;
-  const double radius = parameters.kernel_radius * input.prepared.lengths->spacing;
+  const double radius =
+      parameters.kernel_radius * input.prepared.lengths->spacing * input.prepared.largest_size;
   const auto reserve = [&](std::uint64_t bytes) {
     absl::Status reserved = memory.ReserveParticles(bytes, "images of walls");
     memory.Done();
@@ -131,11 +137,18 @@ absl::Status TakeWallParticles(const Frame& given, const ReconstructionParameter
   scale.cell_size = prepared.lengths->cell_size;
   status = CheckDistances(given, parameters.plane, scale);
   if (!status.ok()) return status;
-  Doubts of_volumes;
-  if (auto lightest = LightestVolume(given, spacing * spacing, of_volumes); !lightest.ok()) {
-    return lightest.status();
+  double smallest = 1;
+  if (parameters.sizes == Sizes::kOwn) {
+    const auto sizes = RangeOfSizes(given, parameters, *prepared.lengths);
+    if (!sizes.ok()) return sizes.status();
+    prepared.largest_size = sizes->Reach();
+    smallest = sizes->smallest;
+  } else {
+    Doubts of_volumes;
+    const auto lightest = LightestVolume(given, spacing * spacing, of_volumes);
+    if (!lightest.ok()) return lightest.status();
   }
-  status = CheckStep(given, parameters.plane, spacing, prepared.doubts);
+  status = CheckStep(given, parameters.plane, spacing * smallest, prepared.doubts);
   return prepared.lengths->is_provisional ? absl::OkStatus() : status;
 }
 

@@ -147,7 +147,7 @@ std::uint64_t CountInside(const LevelSet& level_set) {
 // Cuts the fluid at the walls.
 void ApplyWalls(const Scale& scale, Workspace::Buffers& b, Doubts& doubts) {
   const std::uint64_t before = CountInside(b.level_set);
-  b.walls.Apply(b.bins.tiles, scale.spacing, b.level_set);
+  b.walls.Apply(b.bins, scale, b.level_set);
   if (3 * CountInside(b.level_set) < before) doubts.Add(Doubt::kWallsHideFluid);
 }
 

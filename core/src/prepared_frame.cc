@@ -138,6 +138,7 @@ absl::Status PrepareFrame(const PreparationInput& input, FrameMemory& memory,
     const auto range = RangeOfSizes(input.given, parameters, lengths);
     if (!range.ok()) return range.status();
     sizes = *range;
+    prepared.largest_size = std::max(prepared.largest_size, sizes.Reach());
   }
   // Slices and surfaces have no check of the resolution.
   if (is_outline && !parameters.slice) {

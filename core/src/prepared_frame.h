@@ -28,6 +28,8 @@ namespace partiemc {
 struct Prepared {
   std::optional<Lengths> lengths;  ///< Empty: the particles give no estimate.
   Doubts doubts;
+  double largest_size = 1;  ///< An upper bound, at least 1, of the sizes of all given particles, in
+                            ///< spacings.
   bool is_filtered = false, is_lifted = false;
   LiftedFrame lifted;  ///< Unless `is_lifted`: the given particles, no copies.
   Window window;       ///< The box along the axes along which bodies percolate.

@@ -56,7 +56,7 @@ inline constexpr std::uint64_t kBytesPerTileOfPhase = 900;
 inline constexpr std::uint64_t kBytesPerInterfacePoint = 500;
 
 /// Bytes for each tile near walls, for each line near such a tile, and for each line.
-inline constexpr std::uint64_t kBytesPerWallTile = 9'000;
+inline constexpr std::uint64_t kBytesPerWallTile = 13'000;
 inline constexpr std::uint64_t kBytesPerWallPair = 60;
 inline constexpr std::uint64_t kBytesPerWallLine = 300;
 

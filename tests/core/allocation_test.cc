@@ -219,14 +219,15 @@ TEST(WarmFrameBox, AllocatesNothing) {
 }
 
 // Bodies that slide along a floor around an obstacle, with walls as lines and as particles, also in
-// a periodic box.
-class WarmFrameAtWalls : public testing::TestWithParam<std::tuple<bool, bool>> {};
+// a periodic box, and of own sizes.
+class WarmFrameAtWalls : public testing::TestWithParam<std::tuple<bool, bool, Sizes>> {};
 INSTANTIATE_TEST_SUITE_P(AreParticlesInBox, WarmFrameAtWalls,
-                         testing::Combine(testing::Bool(), testing::Bool()));
+                         testing::Combine(testing::Bool(), testing::Bool(),
+                                          testing::Values(Sizes::kEqual, Sizes::kOwn)));
 
 TEST_P(WarmFrameAtWalls, AllocatesNothing) {
-  const auto [are_particles, in_box] = GetParam();
-  ReconstructionParameters parameters{.spacing = 1.0};
+  const auto [are_particles, in_box, sizes] = GetParam();
+  ReconstructionParameters parameters{.spacing = 1.0, .sizes = sizes};
   if (in_box) parameters.box = PeriodicBox{.axes = {PeriodicAxis{-20, 120}}};
   if (are_particles) {
     parameters.wall_phases = {2};
@@ -245,6 +246,7 @@ TEST_P(WarmFrameAtWalls, AllocatesNothing) {
       frame.phases.resize(frame.size(), 2);
     }
     for (std::size_t id = 0; id < frame.size(); ++id) frame.ids.push_back(id);
+    if (sizes == Sizes::kOwn) frame.volumes = VaryingVolumes(frame.size());
     frames.push_back(frame);
   }
   State state;

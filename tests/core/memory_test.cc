@@ -85,6 +85,10 @@ std::vector<MemoryCase> MemoryCases(Carried carried) {
   add("body in a round tank", support::Disc(200), {.walls = tank});
   add("drops at walls", spread(150, 5),
       {.walls = {{{0, 7, 1, 7}}, {{7, 1, 7, 0}}, {{0, 0, 1, 1}}}});
+  add("body of own sizes in a round tank", sized(support::Disc(200)),
+      {.sizes = Sizes::kOwn, .walls = tank});
+  add("drops of own sizes at walls", sized(spread(150, 5)),
+      {.sizes = Sizes::kOwn, .walls = {{{0, 7, 1, 7}}, {{7, 1, 7, 0}}, {{0, 0, 1, 1}}}});
   add("drops among wall particles", phased(spread(150, 1.2)), {.wall_phases = {2}});
   add("body among wall particles", phased(support::Disc(200)), {.wall_phases = {2}});
   const ReconstructionParameters grains{

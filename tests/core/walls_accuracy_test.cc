@@ -22,40 +22,36 @@ namespace {
 using support::Body;
 using support::Particles;
 using support::Random;
+using support::WallFrame;
 
 constexpr int kPlacements = 8;
 
 double Equal(Random&, double, double) { return 1; }
 
-// A frame of reference along a wall: a = along it, w = the height above it.
-struct WallFrame {
-  double x, y, ux, uy;
+// Particles of the sizes 1 and `size`; `share` of them are large.
+support::DrawSize OfTwo(double size, double share) {
+  return [=](Random& random, double, double) { return random.Chance(share) ? size : 1.0; };
+}
 
-  explicit WallFrame(Random& random) {
-    const double tilt = random.Uniform(0, 2 * std::numbers::pi);
-    x = random.Uniform(-3, 3);
-    y = random.Uniform(-3, 3);
-    ux = std::cos(tilt);
-    uy = std::sin(tilt);
-  }
-  double A(double px, double py) const { return (px - x) * ux + (py - y) * uy; }
-  double W(double px, double py) const { return (py - y) * ux - (px - x) * uy; }
-  void Add(double a, double w, Particles& to) const {
-    to.Add(x + a * ux - w * uy, y + a * uy + w * ux);
-  }
-  Wall Floor() const { return {{x, y, x + ux, y + uy}}; }
+// Particles at a wall. `spacing`: the root mean square of their sizes.
+struct Fluid {
+  const char* name;
+  support::DrawSize draw;
+  double spacing;
+  Sizes sizes = Sizes::kOwn;
 };
 
 struct DropFigures {
   double foot = 0, angle = 0, deviation = 0, area = 0;  // Means of magnitudes.
-  double worst_foot = 0;
+  double worst_foot = 0;                                // Lengths are in spacings.
 };
 
 // A drop whose outline is an arc that meets a wall at a known angle, in degrees.
-DropFigures MeasureDrops(double degrees, double noise, std::uint64_t seed) {
+DropFigures MeasureDrops(const Fluid& fluid, double degrees, double noise, std::uint64_t seed) {
   DropFigures figures;
   int feet = 0, points = 0;
-  const double angle = degrees * std::numbers::pi / 180, radius = degrees < 45 ? 32 : 16;
+  const double h = fluid.spacing;
+  const double angle = degrees * std::numbers::pi / 180, radius = (degrees < 45 ? 32 : 16) * h;
   const double centre = -radius * std::cos(angle), half = radius * std::sin(angle);
   Random random(seed);
   for (int k = 0; k < kPlacements; ++k) {
@@ -64,16 +60,17 @@ DropFigures MeasureDrops(double degrees, double noise, std::uint64_t seed) {
                       const double a = frame.A(x, y), w = frame.W(x, y);
                       return std::max(std::hypot(a, w - centre) - radius, -w);
                     },
-                    60};
-    Particles particles = Filled(drop, random, Equal);
+                    60 * h};
+    Particles particles = Filled(drop, random, fluid.draw);
     particles = Shaken(particles, random, noise);
-    const Result result =
-        support::ReconstructOnce({.spacing = 1.0, .walls = {frame.Floor()}}, particles);
+    const Result result = support::ReconstructOnce(
+        {.spacing = h, .sizes = fluid.sizes, .walls = {frame.Floor()}}, particles);
     EXPECT_TRUE(Validate(result).ok());
     const Rings& rings = result.rings;
     for (std::size_t c = 0; c < rings.contacts.size(); ++c) {
       const std::size_t p = 2 * std::size_t{rings.contacts[c]};
-      const double off = std::abs(std::abs(frame.A(rings.points[p], rings.points[p + 1])) - half);
+      const double a = frame.A(rings.points[p], rings.points[p + 1]);
+      const double off = std::abs(std::abs(a) - half) / h;
       figures.foot += off;
       figures.worst_foot = std::max(figures.worst_foot, off);
       figures.angle +=
@@ -83,8 +80,8 @@ DropFigures MeasureDrops(double degrees, double noise, std::uint64_t seed) {
     for (std::size_t p = 0; p < rings.points.size(); p += 2) {
       const double a = frame.A(rings.points[p], rings.points[p + 1]);
       const double w = frame.W(rings.points[p], rings.points[p + 1]);
-      if (w < .1) continue;
-      figures.deviation += std::abs(std::hypot(a, w - centre) - radius);
+      if (w < .1 * h) continue;
+      figures.deviation += std::abs(std::hypot(a, w - centre) - radius) / h;
       ++points;
     }
     const double area = radius * radius * (angle - std::sin(angle) * std::cos(angle));
@@ -102,7 +99,8 @@ TEST(WallsAccuracy, DropsMeetWallsAtTheirAngles) {
   for (const double degrees : {30.0, 60.0, 90.0, 120.0, 150.0}) {
     for (const double noise : {0.0, .1}) {
       SCOPED_TRACE(testing::Message() << degrees << " degrees, noise " << noise);
-      const DropFigures figures = MeasureDrops(degrees, noise, 51);
+      const DropFigures figures =
+          MeasureDrops({"equal", Equal, 1, Sizes::kEqual}, degrees, noise, 51);
       std::printf("%8.0f %6.2f %7.3f %7.3f %7.2f %10.3f %6.2f%%\n", degrees, noise, figures.foot,
                   figures.worst_foot, figures.angle, figures.deviation, 100 * figures.area);
       if (noise > 0) continue;
@@ -113,6 +111,33 @@ TEST(WallsAccuracy, DropsMeetWallsAtTheirAngles) {
         EXPECT_LT(figures.angle, 3);
       }
       EXPECT_LT(figures.deviation, .05);
+    }
+  }
+}
+
+TEST(WallsAccuracy, DropsOfOwnSizesMeetWallsAtTheirAngles) {
+  // Large particles on one side, small ones on the other.
+  const auto zones = [](Random& random, double x, double) {
+    return x > 0 ? 1.0 : random.Chance(.25) ? 2.0 : 0;
+  };
+  const Fluid fluids[] = {{"equal", Equal, 1},
+                          {"1:3", OfTwo(3, .2), std::sqrt(2.6)},
+                          {"2:1 zones", zones, std::sqrt(1.6)}};
+  std::printf("%10s %8s %6s %7s %7s %7s %10s %7s\n", "sizes", "degrees", "noise", "foot", "worst",
+              "angle", "deviation", "area");
+  for (const Fluid& fluid : fluids) {
+    for (const double degrees : {60.0, 90.0, 120.0}) {
+      for (const double noise : {0.0, .1}) {
+        const DropFigures figures = MeasureDrops(fluid, degrees, noise, 52);
+        std::printf("%10s %8.0f %6.2f %7.3f %7.3f %7.2f %10.3f %6.2f%%\n", fluid.name, degrees,
+                    noise, figures.foot, figures.worst_foot, figures.angle, figures.deviation,
+                    100 * figures.area);
+        EXPECT_LT(figures.area, .02);
+        if (noise > 0) continue;
+        EXPECT_LT(figures.foot, .3);
+        EXPECT_LT(figures.angle, 5);
+        EXPECT_LT(figures.deviation, .1);
+      }
     }
   }
 }

@@ -432,7 +432,8 @@ TEST(Walls, BrokenRulesAreNamed) {
   cases.push_back({of, "walls", "placement is virtual-plane"});
   of = with(floor);
   of.sizes = Sizes::kOwn;
-  cases.push_back({of, "walls", "sizes are equal"});
+  of.boundary = Boundary::kGrains;
+  cases.push_back({of, "walls", "boundary is grains"});
   of = with(floor);
   of.isovalue = .5;
   cases.push_back({of, "walls", "isovalue"});

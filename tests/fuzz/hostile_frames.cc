@@ -215,9 +215,8 @@ ReconstructionParameters HostileParameters(Choices& choices) {
     parameters.sizes = Sizes::kOwn;
     if (choices.Below(2) == 1) parameters.boundary = Boundary::kGrains;
   }
-  const bool may_have_walls = parameters.boundary == Boundary::kBulk &&
-                              parameters.sizes == Sizes::kEqual &&
-                              parameters.placement == Placement::kVirtualPlane;
+  const bool may_have_walls =
+      parameters.boundary == Boundary::kBulk && parameters.placement == Placement::kVirtualPlane;
   const bool may_have_phases =
       parameters.boundary == Boundary::kBulk && parameters.placement == Placement::kVirtualPlane;
   if (may_have_phases && choices.Below(2) == 1) {

@@ -186,7 +186,7 @@ struct ReconstructionParameters {
   /// With own sizes, a particle acts within `kernel_radius` times h_i, and smoothing follows the
   /// local size. Frames must have volumes. Except with grains, an absent spacing is estimated as
   /// the root mean square of the sizes. A size must be within a factor of `kMostSizeRatio` of the
-  /// spacing, and its kernel radius at most 32 cells. Excludes slices, `walls`, `noise_filter` and
+  /// spacing, and its kernel radius at most 32 cells. Excludes slices, `noise_filter` and
   /// Placement::kFarthestParticle.
   static constexpr double kMostSizeRatio = 10;
   Sizes sizes = Sizes::kEqual;
@@ -293,11 +293,10 @@ struct ReconstructionParameters {
   static constexpr std::size_t kMaxWallPoints = 1024;
 
   /// Walls, of at most 1024 points together, at which the outline is cut (core/WALLS.md). The fluid
-  /// lies on the fluid side of every wall. An outline nearer than half a spacing to a wall runs
+  /// lies on the fluid side of every wall. An outline nearer than half a local size to a wall runs
   /// along the wall. Obstacles narrower than a cell may be missed. In a box, endless lines are
   /// parallel to the periodic axis, and polygons are obstacles, which have periodic images.
-  /// Requires Placement::kVirtualPlane; excludes surfaces, slices, isovalues, sections and own
-  /// sizes.
+  /// Requires Placement::kVirtualPlane; excludes surfaces, slices, isovalues, sections and grains.
   std::vector<Wall> walls = {};
 
   static constexpr std::size_t kMaxWallPhases = 16;

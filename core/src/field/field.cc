@@ -95,22 +95,42 @@ void ClassifyByDensity(const ParticleBins& bins, const Scale& scale, std::uint32
   ClassifyNodes(WeightOf(bins, scale), scale, values, level_set.inside[tile], level_set.open[tile]);
 }
 
+// Calls visit(node, i, j) for the requested nodes (i, j) of a tile in a block; `node` is the number
+// in the block.
+template <typename Visit>
+void ForEachAsked(const NodeBlock& block, Visit visit) {
+  for (std::uint32_t asked = block.asked; asked != 0; asked &= asked - 1) {
+    const int node = std::countr_zero(asked);
+    visit(node, block.column + node % NodeBlock::kSide, block.row + node / NodeBlock::kSide);
+  }
+}
+
 // Lowers F at the requested nodes to the distance from the surface of the nearest grain, if this is
 // less. Returns `inside` with the nodes at which F is then negative.
 BitRows JoinGrains(const NodeBlocks& blocks, const GrainDistances& distances, BitRows inside,
                    float* values) {
   for (int b = 0; b < blocks.count; ++b) {
-    const NodeBlock& block = blocks[b];
-    for (std::uint32_t asked = block.asked; asked != 0; asked &= asked - 1) {
-      const int node = std::countr_zero(asked);
-      const int i = block.column + node % NodeBlock::kSide;
-      const int j = block.row + node / NodeBlock::kSide;
+    ForEachAsked(blocks[b], [&](int node, int i, int j) {
       float& value = values[j * kTileSize + i];
       value = std::min(value, distances.blocks[b][node]);
       inside[j] |= static_cast<std::uint32_t>(value < 0) << i;
-    }
+    });
   }
   return inside;
+}
+
+// Calls visit(block) for the particles whose kernels reach a requested node of a tile, and for some
+// others.
+template <typename Visit>
+void ForEachNear(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                 const BitRows& asked, Visit visit) {
+  CellMask mask = MaskOf(asked);
+  const int reach = static_cast<int>(std::ceil(scale.reach));
+  const bool masked = reach < kMaskMargin;
+  // A kernel reaches node i from the cells i - reach to i + reach - 1: cell c extends from c to c +
+  // 1.
+  if (masked) Widen(mask, reach, reach - 1);
+  MaskedParticles(bins, tile, masked ? &mask : nullptr).ForEachBlock(visit);
 }
 
 // Computes F at the given nodes of a tile from their moments. Returns the nodes that are inside.
@@ -123,18 +143,11 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   if (scale.has_grains) {
     for (int b = 0; b < blocks.count; ++b) distances.blocks[b].fill(kTileSize);
   }
-  CellMask mask = MaskOf(asked.rows);
-  const int reach = static_cast<int>(std::ceil(scale.reach));
-  const bool masked = reach < kMaskMargin;
-  // A kernel reaches node i from the cells i - reach to i + reach - 1: cell c extends from c to c +
-  // 1.
-  if (masked) Widen(mask, reach, reach - 1);
   const auto radius = static_cast<float>(scale.kernel_radius);
-  MaskedParticles(bins, tile, masked ? &mask : nullptr)
-      .ForEachBlock([&](const ParticleBlock& near) {
-        AddNearMoments(near, SizesOf(bins), radius, blocks, asked.has_kernel_sums, sums);
-        if (scale.has_grains) AddNearGrains(near, SizesOf(bins), scale, blocks, distances);
-      });
+  ForEachNear(bins, scale, tile, asked.rows, [&](const ParticleBlock& near) {
+    AddNearMoments(near, SizesOf(bins), radius, blocks, asked.has_kernel_sums, sums);
+    if (scale.has_grains) AddNearGrains(near, SizesOf(bins), scale, blocks, distances);
+  });
   float* const values = level_set.tiles[tile].data();
   const BitRows inside = EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale, values);
   return scale.has_grains ? JoinGrains(blocks, distances, inside, values) : inside;
@@ -235,6 +248,23 @@ void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_s
   };
   for_the_rest(kSummed, ClassifyTile);
   for_the_rest(kClassified, SampleDecidedEnds);
+}
+
+void FindLocalSizes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                    const BitRows& asked, std::array<float, kTileNodes>& sizes) {
+  const NodeBlocks blocks = BlocksOf(asked);
+  MomentSums sums;
+  std::fill_n(sums.begin(), blocks.count, BlockSums{});
+  ForEachNear(bins, scale, tile, asked, [&](const ParticleBlock& near) {
+    AddNearMoments(near, SizesOf(bins), static_cast<float>(scale.kernel_radius), blocks, false,
+                   sums);
+  });
+  for (int b = 0; b < blocks.count; ++b) {
+    ForEachAsked(blocks[b], [&](int node, int i, int j) {
+      const float kernel = sums[b].kernel[node];
+      sizes[j * kTileSize + i] = kernel > 0 ? sums[b].size[node] / kernel : 0;
+    });
+  }
 }
 
 }  // namespace partiemc

@@ -43,4 +43,9 @@ struct LevelSet {
 /// particles, times the square of the kernel radius in cells.
 void SampleField(const ParticleBins& bins, const Scale& scale, LevelSet& level_set);
 
+/// Sets `sizes` at the requested nodes of a tile to the local size, in spacings; 0 where no kernel
+/// reaches. Requires: own sizes. Cost: linear in the particles near the requested nodes.
+void FindLocalSizes(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
+                    const BitRows& asked, std::array<float, kTileNodes>& sizes);
+
 }  // namespace partiemc

@@ -104,7 +104,7 @@ absl::Status CheckOthers(const ReconstructionParameters& p, const std::string& f
   if (p.slice) return refused("must be absent with a slice");
   if (p.isovalue) return refused("must be absent with an isovalue");
   if (!p.sections.empty()) return refused("must be absent with sections: slices, isolines, phases");
-  if (p.sizes != Sizes::kEqual) return refused("must be absent unless sizes are equal");
+  if (p.boundary == Boundary::kGrains) return refused("must be absent if the boundary is grains");
   if (p.placement != Placement::kVirtualPlane) {
     return refused("must be absent unless the placement is virtual-plane");
   }

@@ -45,10 +45,10 @@ class ContactCurve {
   };
 
   /// Fits a curve by least squares to the part of the stretch from 1.5 h above the wall, up to 6 h
-  /// long. `spacing`: the particle spacing h in cells. Empty if this part is too short, or if the
-  /// curve does not meet the wall nearby at ten degrees or more. Empty also if another solid covers
-  /// the wall between the contact and the foot, the point where the curve meets the wall.
-  /// Cost: linear in the points and in the lines near the contact.
+  /// long. `spacing`: h, the spacing times the local size, in cells. Empty if this part is too
+  /// short, or if the curve does not meet the wall nearby at ten degrees or more. Empty also if
+  /// another solid covers the wall between the contact and the foot, the point where the curve
+  /// meets the wall. Cost: linear in the points and in the lines near the contact.
   static std::optional<ContactCurve> Fit(const Surroundings& around, const WallPlace& contact,
                                          double spacing, StretchPoint point);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <span>
 
 #include "base/cancellation.h"
 #include "vertices/contact_curve.h"
@@ -25,11 +26,12 @@ constexpr double kMostShare = .45;
 // Fits one contact. Lengths are in cells.
 class ContactFitter {
  public:
-  ContactFitter(const VertexInput& input, WallVertices& points, Rings& rings)
+  ContactFitter(const VertexInput& input, std::span<const float> sizes, WallVertices& points,
+                Rings& rings)
       : input_(input),
         walls_(*input.walls),
         lines_(input.walls->lines()),
-        h_(input.scale.spacing),
+        sizes_(sizes),
         cell_size_(input.scale.cell_size),
         p_(points),
         rings_(rings) {}
@@ -39,6 +41,7 @@ class ContactFitter {
     count_ = rings_.offsets[ring + 1] - first_;
     contact_ = contact;
     is_wet_after_ = p_.is_wet[contact] != 0;
+    h_ = input_.scale.spacing * (sizes_.empty() ? 1.0 : double{sizes_[Free(1)]});
     const WallPlace& place = p_.place[contact];
     const WallEdge& edge = lines_.edges()[place.edge];
     loop_ = edge.loop;
@@ -181,19 +184,22 @@ class ContactFitter {
   const VertexInput& input_;
   const WallField& walls_;
   const WallLines& lines_;
-  const double h_, cell_size_;
+  const std::span<const float> sizes_;
+  const double cell_size_;
   WallVertices& p_;
   Rings& rings_;
   std::size_t first_ = 0, count_ = 0, contact_ = 0;
   bool is_wet_after_ = false;
+  double h_ = 0;  // The spacing times the local size at the end of the stretch.
   std::size_t loop_ = 0;
   double start_ = 0;
 };
 
 }  // namespace
 
-void FitContacts(const VertexInput& input, WallVertices& points, Rings& rings) {
-  ContactFitter fitter(input, points, rings);
+void FitContacts(const VertexInput& input, std::span<const float> sizes, WallVertices& points,
+                 Rings& rings) {
+  ContactFitter fitter(input, sizes, points, rings);
   for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
     ThrowIfCancelled();
     for (std::size_t k = rings.offsets[ring]; k < rings.offsets[ring + 1]; ++k) {
@@ -202,10 +208,13 @@ void FitContacts(const VertexInput& input, WallVertices& points, Rings& rings) {
   }
 }
 
-void PinToWalls(const VertexInput& input, const WallVertices& points, Rings& rings) {
+void PinToWalls(const VertexInput& input, std::span<const float> sizes, const WallVertices& points,
+                Rings& rings) {
   const WallField& walls = *input.walls;
-  const double cell_size = input.scale.cell_size, clearance = kClearance * input.scale.spacing;
+  const double cell_size = input.scale.cell_size;
   for (std::size_t k = 0; k < rings.PointCount(); ++k) {
+    const double size = sizes.empty() ? 1.0 : double{sizes[k]};
+    const double clearance = kClearance * input.scale.spacing * size;
     double* const target = &rings.points[2 * k];
     if (points.kind[k] != VertexKind::kFree) {
       const Point at = walls.lines().InWorld(points.place[k]);

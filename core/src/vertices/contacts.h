@@ -1,6 +1,8 @@
 // Where outlines meet walls: the contacts and their angles (core/WALLS.md).
 #pragma once
 
+#include <span>
+
 #include "partiemc/result.h"
 #include "vertices/wall_vertices.h"
 
@@ -13,17 +15,20 @@ struct VertexInput;
 /// the curve. Vertices on the wall that the contact passes move ahead of it. A contact stops at
 /// sharp corners of its wall, before the next contact and before another wall; then a straight line
 /// replaces the curve. Without a curve a contact stays. Sets the angles of contacts: by the curve,
-/// or by a chord of two spacings for a contact that stopped or stayed.
+/// or by a chord of two local sizes for a contact that stopped or stayed.
 ///
 /// Call it before the area step (CorrectVolume), whose target counts the wetted area, and after the
-/// area step, because that step moves the curves. `points` has the points of `rings`. Cost: for
-/// each contact, linear in the lines near it and in the vertices of its stretch.
-void FitContacts(const VertexInput& input, WallVertices& points, Rings& rings);
+/// area step, because that step moves the curves. `points` has the points of `rings`. `sizes`: by
+/// point, the local size; empty for equal sizes. Cost: for each contact, linear in the lines near
+/// it and in the vertices of its stretch.
+void FitContacts(const VertexInput& input, std::span<const float> sizes, WallVertices& points,
+                 Rings& rings);
 
 /// Moves points on walls to their places (WallVertices::place). Moves free points that are in a
-/// solid, or closer to it than .02 spacings, to this distance before its wall. Free points deeper
-/// than WallField::kMostHeight stay.
-void PinToWalls(const VertexInput& input, const WallVertices& points, Rings& rings);
+/// solid, or closer to it than .02 local sizes, to this distance before its wall. Free points
+/// deeper than WallField::kMostHeight stay. `sizes`: as for FitContacts.
+void PinToWalls(const VertexInput& input, std::span<const float> sizes, const WallVertices& points,
+                Rings& rings);
 
 /// Appends the wet points (WallVertices::is_wet) to Rings::wetted, and the contacts and their
 /// angles to Rings::contacts and contact_angles.

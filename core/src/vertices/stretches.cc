@@ -39,9 +39,12 @@ struct StretchEnd {
     return ring.At(is_forward ? from + k : from + ring.count - k);
   }
 
+  // The local size at the end of the stretch.
+  double SizeOf(const RingVertices& v) const { return v.SizeOf(At(1)); }
+
   std::optional<ContactCurve> Fit(const RingVertices& v) const {
     return ContactCurve::Fit({*input.walls, input.bins.tiles, v.walls.tile[At(0)]},
-                             v.walls.place[At(0)], input.scale.spacing,
+                             v.walls.place[At(0)], input.scale.spacing * SizeOf(v),
                              [&](std::size_t k) -> std::optional<Point> {
                                if (k >= ring.count) return std::nullopt;
                                if (v.walls.kind[At(k)] != VertexKind::kFree) return std::nullopt;
@@ -59,13 +62,17 @@ struct StretchEnd {
     }
   }
 
-  // Appends the points beyond the wall, in the order of the ring.
-  void AddBeyond(const ContactCurve& curve, double reach, std::vector<StretchPoint>& to) const {
+  // Appends the points beyond the wall, in the order of the ring. `reach`: in local sizes times
+  // cells.
+  void AddBeyond(const ContactCurve& curve, double reach, double size,
+                 std::vector<StretchPoint>& to) const {
     const double step = kStep * input.scale.spacing;
     const auto count = static_cast<std::size_t>(std::ceil(reach / step));
     for (std::size_t k = 0; k <= count; ++k) {
-      const double s = curve.s_foot() - step * static_cast<double>(is_forward ? count - k : k);
-      to.push_back({curve.At(s), NormalOf(curve.DirectionAt(s), is_forward ? 1 : -1), kNoVertex});
+      const double s =
+          curve.s_foot() - step * size * static_cast<double>(is_forward ? count - k : k);
+      to.push_back({curve.At(s), NormalOf(curve.DirectionAt(s), is_forward ? 1 : -1),
+                    static_cast<float>(size), kNoVertex});
     }
   }
 };
@@ -86,11 +93,12 @@ void ForEachStretch(const VertexInput& input, std::size_t ring, double reach, Ri
     if (in) before.MoveOnto(*in, v);
     if (out) after.MoveOnto(*out, v);
     v.stretch.clear();
-    if (in) before.AddBeyond(*in, reach, v.stretch);
+    if (in) before.AddBeyond(*in, reach, before.SizeOf(v), v.stretch);
     for (std::size_t k = start; k < end; ++k) {
-      v.stretch.push_back({v.point[of.At(k)], v.normal[of.At(k)], of.At(k)});
+      const std::size_t i = of.At(k);
+      v.stretch.push_back({v.point[i], v.normal[i], static_cast<float>(v.SizeOf(i)), i});
     }
-    if (out) after.AddBeyond(*out, reach, v.stretch);
+    if (out) after.AddBeyond(*out, reach, after.SizeOf(v), v.stretch);
     if (v.stretch.size() >= 3) visit();
   }
 }

@@ -139,7 +139,8 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   const bool has_walls =
       input.walls != nullptr &&
       std::ranges::any_of(vertices.meets_wall, [](std::uint8_t meets) { return meets != 0; });
-  scratch.sizes.resize(input.scale.has_own_sizes || has_walls ? count : 0);
+  scratch.sizes.resize(input.scale.has_own_sizes ? count : 0);
+  scratch.offset_factors.resize(has_walls ? count : 0);
   if (has_walls) scratch.walls.Resize(count);
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     std::size_t point = rings.offsets[ring];
@@ -155,18 +156,20 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
       if (!vertices.size.empty()) scratch.sizes[point] = vertices.size[i];
       if (has_walls) {
         scratch.walls.Copy(vertices.walls, i, point);
-        scratch.sizes[point] = vertices.walls.kind[i] == VertexKind::kFree ? 1.0F : 0.0F;
+        const bool is_free = vertices.walls.kind[i] == VertexKind::kFree;
+        scratch.offset_factors[point] = is_free ? static_cast<float>(vertices.SizeOf(i)) : 0;
       }
       ++point;
     }
   });
   rings.outer_of = topology.outer_of;
   std::iota(placed.kept_as.begin(), placed.kept_as.end(), 0u);
-  if (has_walls) FitContacts(input, scratch.walls, rings);
-  CorrectVolume(input, scratch.sizes, scratch.offset_points, area_offset, rings);
+  if (has_walls) FitContacts(input, scratch.sizes, scratch.walls, rings);
+  CorrectVolume(input, {scratch.sizes, has_walls ? scratch.offset_factors : scratch.sizes},
+                scratch.offset_points, area_offset, rings);
   if (has_walls) {
-    FitContacts(input, scratch.walls, rings);
-    PinToWalls(input, scratch.walls, rings);
+    FitContacts(input, scratch.sizes, scratch.walls, rings);
+    PinToWalls(input, scratch.sizes, scratch.walls, rings);
     ListContacts(scratch.walls, rings);
   }
   SnapToAxes(cell_size, rings.points);

@@ -49,6 +49,7 @@ struct VertexNormal {
 struct StretchPoint {
   Point point;  ///< In cells from the origin of the world.
   VertexNormal normal;
+  float size;          ///< The local size, in spacings; 1 for equal sizes.
   std::size_t vertex;  ///< Index in RingVertices; kNoVertex beyond a wall.
 };
 inline constexpr std::size_t kNoVertex = ~std::size_t{0};
@@ -67,6 +68,7 @@ struct RingVertices {
   std::vector<std::uint8_t> meets_wall;  ///< By ring; unused without walls.
   std::vector<StretchPoint> stretch;     ///< Scratch of the stretches between walls.
   std::vector<Point> stretch_path;       ///< Scratch: the points of `stretch`, there and back.
+  std::vector<float> stretch_sizes;      ///< Scratch: their local sizes; empty for equal sizes.
 
   double SizeOf(std::size_t vertex) const { return size.empty() ? 1.0 : double{size[vertex]}; }
 
@@ -84,7 +86,8 @@ struct VertexScratch {
   std::vector<double> points;         ///< One or two for each segment; not for `virtual-plane`.
   RingVertices vertices;              ///< `virtual-plane` only.
   WallVertices walls;                 ///< By point of the rings.
-  std::vector<float> sizes;           ///< By point: the factor of its offset (CorrectVolume).
+  std::vector<float> sizes;           ///< By point: the local size; empty for equal sizes.
+  std::vector<float> offset_factors;  ///< By point, if rings meet walls (PointSizes::factors).
   std::vector<double> offset_points;  ///< Scratch of CorrectVolume.
   RepairScratch repair;
 };

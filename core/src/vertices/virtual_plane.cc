@@ -122,10 +122,10 @@ struct ClosedRun {
   std::size_t first;  // Even.
   std::ptrdiff_t count;
 
-  static constexpr bool kHasOnlyVertices = true;
   std::size_t VertexAt(std::ptrdiff_t k) const { return first + static_cast<std::size_t>(k); }
   const Point& PointAt(std::ptrdiff_t k) const { return v.point[VertexAt(k)]; }
   const VertexNormal& NormalAt(std::ptrdiff_t k) const { return v.normal[VertexAt(k)]; }
+  double SizeAt(std::ptrdiff_t k) const { return v.SizeOf(VertexAt(k)); }
   // Number of points before the points repeat (OpenRun).
   std::ptrdiff_t OwnCount() const { return count; }
   bool HasVertex(std::ptrdiff_t) const { return true; }
@@ -136,7 +136,6 @@ struct ClosedRun {
 struct OpenRun {
   std::span<const StretchPoint> points;
 
-  static constexpr bool kHasOnlyVertices = false;
   const StretchPoint& Of(std::ptrdiff_t k) const {
     const auto at = static_cast<std::size_t>(k);
     return points[at < points.size() ? at : 2 * points.size() - 2 - at];
@@ -144,6 +143,7 @@ struct OpenRun {
   std::size_t VertexAt(std::ptrdiff_t k) const { return Of(k).vertex; }
   const Point& PointAt(std::ptrdiff_t k) const { return Of(k).point; }
   const VertexNormal& NormalAt(std::ptrdiff_t k) const { return Of(k).normal; }
+  double SizeAt(std::ptrdiff_t k) const { return double{Of(k).size}; }
   std::ptrdiff_t OwnCount() const { return static_cast<std::ptrdiff_t>(points.size()); }
   bool HasVertex(std::ptrdiff_t k) const { return Of(k).vertex != kNoVertex; }
 };
@@ -175,17 +175,14 @@ PeriodicRings::Size SizeOf(const VertexInput& input, std::size_t ring, const Rin
   return size;
 }
 
-// The local size at a vertex of a run; 1 on an OpenRun, because sizes are equal if there are walls.
-template <typename Run>
-double SizeAt(const RingVertices& v, const Run& run, std::ptrdiff_t k) {
-  return Run::kHasOnlyVertices ? v.SizeOf(run.VertexAt(k)) : 1.0;
-}
-
-double LengthOf(std::span<const Point> path) {
+// The length of an open path. `sizes`: by point, the local size, by which lengths are divided;
+// empty if all are 1.
+double LengthOf(std::span<const Point> path, std::span<const float> sizes) {
   double length = 0;
   for (std::size_t k = 1; k < path.size(); ++k) {
     const Point chord{path[k].x - path[k - 1].x, path[k].y - path[k - 1].y};
-    length += std::sqrt(Dot(chord, chord));
+    const double size = sizes.empty() ? 1 : (double{sizes[k - 1]} + sizes[k]) / 2;
+    length += std::sqrt(Dot(chord, chord)) / size;
   }
   return length;
 }
@@ -275,8 +272,7 @@ void FindSupports(const LevelSetSampler& field, const SupportShape& support,
 // the shape. A larger variance of the supporting particles' heights reduces the weight of the
 // estimates. Estimates, their mean and `shift` are divided by the local size.
 template <typename Run>
-void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring,
-                 const RingVertices& v) {
+void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring) {
   const double h = input.scale.spacing;
   const VirtualPlaneSteps& steps = input.variant.steps;
   const VirtualPlaneConstants& c = input.variant.constants;
@@ -301,7 +297,7 @@ void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring,
           const std::size_t i = groups[q].vertices[of];
           const auto [offset, variance] = EstimateOf(sums[q][of], support);
           ring.shift[i] =
-              static_cast<float>(offset) - static_cast<float>(ring.base[i] / SizeAt(v, run, i));
+              static_cast<float>(offset) - static_cast<float>(ring.base[i] / run.SizeAt(i));
           scatter[i] = static_cast<float>(variance);
         }
       }
@@ -310,7 +306,7 @@ void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring,
       // Each segment has two vertices.
       if (k % 2 == 0 && BeginsGroup(static_cast<std::size_t>(k / 2))) planes.Part();
       // A radius of curvature below one spacing is noise.
-      const double size = SizeAt(v, run, k);
+      const double size = run.SizeAt(k);
       const double sharpest = 1 / (h * size);
       const double curvature = std::clamp<double>(ring.shift[k], -sharpest, sharpest);
       ring.base[k] = steps.curvature ? static_cast<float>(rounding * size * size * curvature) : 0;
@@ -342,7 +338,7 @@ void ShiftPlanes(const VertexInput& input, const Run& run, PeriodicRing& ring,
     const double trust = c.support_scatter / (c.support_scatter + MeanOf(run, ring, scatter));
     for (std::ptrdiff_t k = 0; k < ring.count; ++k) {
       if (!run.HasVertex(k)) continue;
-      ring.base[k] += static_cast<float>(trust * (ring.shift[k] - mean) * SizeAt(v, run, k));
+      ring.base[k] += static_cast<float>(trust * (ring.shift[k] - mean) * run.SizeAt(k));
     }
   }
   ring.Repeat(ring.base, 0, ring.count);
@@ -377,7 +373,7 @@ void RefineRun(const VertexInput& input, std::span<const float> sizes, const Run
                PeriodicRing ring, RingVertices& v) {
   CopyRing(sizes, run, ring);
   if (input.variant.steps.normals) SmoothNormals(input, ring);
-  ShiftPlanes(input, run, ring, v);
+  ShiftPlanes(input, run, ring);
   SmoothPositions(input, run, ring, v);
 }
 
@@ -397,17 +393,19 @@ void RefineStretches(const VertexInput& input, RingVertices& v) {
     if (v.meets_wall[ring] == 0) continue;
     ThrowIfCancelled();
     ForEachStretch(input, ring, min_length / 2, v, [&] {
-      std::vector<Point>& path = v.stretch_path;
-      path.clear();
-      for (std::size_t k = 0; k < 2 * v.stretch.size() - 2; ++k) {
-        path.push_back(OpenRun{v.stretch}.PointAt(static_cast<std::ptrdiff_t>(k)));
+      const OpenRun run{v.stretch};
+      v.stretch_path.clear();
+      v.stretch_sizes.clear();
+      for (std::ptrdiff_t k = 0; k < 2 * run.OwnCount() - 2; ++k) {
+        v.stretch_path.push_back(run.PointAt(k));
+        if (input.scale.has_own_sizes) v.stretch_sizes.push_back(run.Of(k).size);
       }
-      if (LengthOf(path) < min_length) return;
-      PeriodicRings::Size size = SizeForWindows(path, {}, min_length / 2);
+      if (LengthOf(v.stretch_path, v.stretch_sizes) < min_length) return;
+      PeriodicRings::Size size = SizeForWindows(v.stretch_path, v.stretch_sizes, min_length / 2);
       size.margin += kWindowPadding;
       memory.sizes().assign(1, size);
       memory.Allocate();
-      RefineRun(input, {}, OpenRun{v.stretch}, memory[0], v);
+      RefineRun(input, v.stretch_sizes, run, memory[0], v);
     });
   }
 }

@@ -111,6 +111,9 @@ class WallVertexFinder {
     v_.point[vertex] = lines_.At(place);
     const Point up = lines_.edges()[place.edge].Left();
     v_.normal[vertex] = {static_cast<float>(-up.x), static_cast<float>(-up.y)};
+    if (v_.size.empty()) return;
+    const double size = walls_.SizeAt(input_.bins.tiles, v_.walls.tile[vertex], v_.point[vertex]);
+    if (size > 0) v_.size[vertex] = static_cast<float>(size);
   }
 
   void FindEdge(std::size_t segment) {
@@ -231,7 +234,7 @@ class WallVertexFinder {
     if (v_.walls.kind[vertex] != VertexKind::kFree || v_.walls.tile[vertex] == kNoTile)
       return false;
     const double height = walls_.Nearest(v_.walls.tile[vertex], v_.root[vertex]).height;
-    return std::abs(height) < WallField::kReach / 2 * input_.scale.spacing;
+    return std::abs(height) < WallField::kReach / 2 * input_.scale.spacing * v_.SizeOf(vertex);
   }
 
   // A corner of a tank may lie in a cell whose nodes are all outside. The ring then passes from one

@@ -10,6 +10,10 @@
 namespace partiemc {
 namespace {
 
+// In cells. Fluid farther from a wall than this never touches it. Less than kMostHeight.
+constexpr double kMostReach = 3.5;
+// The nodes around a point on a wall are at most this far from the wall, in cells.
+constexpr float kBeside = 1.5F;
 // Nodes deeper in the solid than this, in cells, need no value of the fluid: no lattice edge joins
 // them to the outside of a wall.
 constexpr float kMostDepth = 1.5F;
@@ -81,20 +85,34 @@ double CrossesColumnAt(const WallEdge& edge, double x) {
   return edge.from.y + (x - edge.from.x) / (edge.to.x - edge.from.x) * (edge.to.y - edge.from.y);
 }
 
+// A point among the four nodes around it.
+struct Surrounded {
+  int i, j;     // The node left of the point and below it, relative to the tile.
+  double u, v;  // The point relative to this node.
+
+  // Of a point of a tile and its neighbours.
+  Surrounded(const TileDirectory& directory, std::uint32_t tile, const Point& point) {
+    const Point origin = OriginOf(directory, tile);
+    const double x = std::clamp<double>(point.x - origin.x, -kTileSize, 2 * kTileSize - 1.001);
+    const double y = std::clamp<double>(point.y - origin.y, -kTileSize, 2 * kTileSize - 1.001);
+    i = static_cast<int>(std::floor(x));
+    j = static_cast<int>(std::floor(y));
+    u = x - i;
+    v = y - j;
+  }
+};
+
 // F at a point of a tile and its neighbours, by bilinear interpolation.
 double Interpolate(const TileDirectory& directory, const LevelSet& level_set, std::uint32_t tile,
-                   Point point) {
-  const Point origin = OriginOf(directory, tile);
-  const double x = std::clamp<double>(point.x - origin.x, -kTileSize, 2 * kTileSize - 1.001);
-  const double y = std::clamp<double>(point.y - origin.y, -kTileSize, 2 * kTileSize - 1.001);
-  const int i = static_cast<int>(std::floor(x)), j = static_cast<int>(std::floor(y));
-  const double u = x - i, v = y - j;
+                   const Point& point) {
+  const Surrounded of(directory, tile, point);
   const auto at = [&](int di, int dj) -> double {
-    const TilePlace node = Normalise(directory, tile, i + di, j + dj);
+    const TilePlace node = Normalise(directory, tile, of.i + di, of.j + dj);
     return node.tile == kNoTile ? level_set.void_value
                                 : level_set.tiles[node.tile][node.j * kTileSize + node.i];
   };
-  return (1 - v) * ((1 - u) * at(0, 0) + u * at(1, 0)) + v * ((1 - u) * at(0, 1) + u * at(1, 1));
+  return (1 - of.v) * ((1 - of.u) * at(0, 0) + of.u * at(1, 0)) +
+         of.v * ((1 - of.u) * at(0, 1) + of.u * at(1, 1));
 }
 
 // Bits i >= `begin`.
@@ -360,15 +378,43 @@ void WallField::MeasureHeights(const TileDirectory& directory, NearTile& near) c
   }
 }
 
-void WallField::ExtendFluid(const TileDirectory& directory, const LevelSet& level_set, double reach,
-                            NearTile& near) const {
+double WallField::SizeAt(const TileDirectory& directory, std::uint32_t tile,
+                         const Point& point) const {
+  if (sizes_.empty()) return 1;
+  const Surrounded of(directory, tile, point);
+  double sum = 0, weight = 0;
+  for (const auto& [di, dj] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
+    const TilePlace node = Normalise(directory, tile, of.i + di, of.j + dj);
+    if (node.tile == kNoTile || near_of_tile_[node.tile] >= near_count_) continue;
+    const float size = sizes_[near_of_tile_[node.tile]][node.j * kTileSize + node.i];
+    if (!(size > 0)) continue;
+    const double share = (di != 0 ? of.u : 1 - of.u) * (dj != 0 ? of.v : 1 - of.v);
+    sum += share * size;
+    weight += share;
+  }
+  return weight > 0 ? sum / weight : 0;
+}
+
+// Fluid nearer to the wall below a node than this, in cells, touches it.
+double WallField::ReachOf(const TileDirectory& directory, const Scale& scale, std::uint32_t tile,
+                          const Point& node) const {
+  if (!scale.has_own_sizes) return kReach * scale.spacing;
+  const Point foot = lines_.At(Nearest(tile, node).place);
+  return std::min(kReach * scale.spacing * SizeAt(directory, tile, foot), kMostReach);
+}
+
+void WallField::ExtendFluid(const TileDirectory& directory, const Scale& scale,
+                            const LevelSet& level_set, NearTile& near) const {
   constexpr int kMostSteps = 4;  // In a corner, the way up leads to the next wall.
+  const double most_reach = kReach * scale.spacing * scale.sizes.largest;
   const Point origin = OriginOf(directory, near.tile);
   for (int node = 0; node < kTileNodes; ++node) {
     near.fluid[node] = level_set.tiles[near.tile][node];
     const float height = near.height[node];
-    if (near.fluid[node] < 0 || height >= reach || height < -kMostDepth) continue;
+    if (near.fluid[node] < 0 || height >= most_reach || height < -kMostDepth) continue;
     Point point{origin.x + node % kTileSize, origin.y + node / kTileSize};
+    const double reach = ReachOf(directory, scale, near.tile, point);
+    if (height >= reach) continue;
     bool is_above = height > 0;
     for (int step = 0; step < kMostSteps; ++step) {
       const NearestWall nearest = Nearest(near.tile, point);
@@ -388,11 +434,23 @@ void WallField::ExtendFluid(const TileDirectory& directory, const LevelSet& leve
   }
 }
 
-void WallField::Apply(const TileDirectory& directory, double spacing, LevelSet& level_set) {
+void WallField::Apply(const ParticleBins& bins, const Scale& scale, LevelSet& level_set) {
+  const TileDirectory& directory = bins.tiles;
+  sizes_.resize(scale.has_own_sizes ? near_count_ : 0);
   ParallelFor(near_count_, [&](std::size_t k) {
     if (near_of_tile_[near_[k].tile] == kSolid) return;
     MeasureHeights(directory, near_[k]);
-    ExtendFluid(directory, level_set, kReach * spacing, near_[k]);
+    if (!scale.has_own_sizes) return;
+    BitRows beside{};
+    for (int node = 0; node < kTileNodes; ++node) {
+      if (std::abs(near_[k].height[node]) > kBeside) continue;
+      beside[node / kTileSize] |= std::uint32_t{1} << node % kTileSize;
+    }
+    sizes_[k].fill(0);
+    FindLocalSizes(bins, scale, near_[k].tile, beside, sizes_[k]);
+  });
+  ParallelFor(near_count_, [&](std::size_t k) {
+    if (near_of_tile_[near_[k].tile] != kSolid) ExtendFluid(directory, scale, level_set, near_[k]);
   });
   ParallelFor(directory.size(), [&](std::size_t tile) {
     const std::uint32_t of = near_of_tile_[tile];

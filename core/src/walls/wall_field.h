@@ -18,16 +18,16 @@ namespace partiemc {
 /// the value F of the fluid. Lengths are in cells.
 ///
 /// Kernels see no particles beyond a wall, so F near a wall does not show whether the fluid touches
-/// it. An outside node lower than `kReach` spacings therefore has the F of the point straight above
-/// it at this height, if that point is inside. Then max(F, -w) replaces F on the lattice: its zeros
-/// are the outline of the fluid, cut at the walls.
+/// it. An outside node lower than the reach, `kReach` local sizes, therefore has the F of the point
+/// straight above it at this height, if that point is inside. Then max(F, -w) replaces F on the
+/// lattice: its zeros are the outline of the fluid, cut at the walls.
 ///
 /// A frame calls ListLines, FindTiles and Apply, in this order.
 class WallField {
  public:
-  /// Fluid nearer to a wall than this touches it. In spacings: the outline lies about half a
-  /// spacing outside of the outermost particles, so a gap of this height holds no layer of
-  /// particles.
+  /// Fluid nearer to a wall than this touches it. In local sizes, which are 1 spacing unless
+  /// particles have own sizes: the outline lies about half a size outside of the outermost
+  /// particles, so a gap of this height holds no layer of particles.
   static constexpr double kReach = .5;
   /// In cells. Larger heights are not measured.
   static constexpr float kMostHeight = 4;
@@ -44,7 +44,7 @@ class WallField {
 
   /// Replaces F, and the bits of inside nodes, in the tiles near walls and in solids. Parallel over
   /// tiles. Cost: linear in the nodes of these tiles, near walls times the lines near their tiles.
-  void Apply(const TileDirectory& directory, double spacing, LevelSet& level_set);
+  void Apply(const ParticleBins& bins, const Scale& scale, LevelSet& level_set);
 
   const WallLines& lines() const { return lines_; }
 
@@ -56,6 +56,10 @@ class WallField {
   /// The wall nearest to a point near the tile, given in cells from the origin of the world. The
   /// height is infinite if no wall is within kMostHeight. Cost: linear in the lines near the tile.
   NearestWall Nearest(std::uint32_t tile, const Point& point) const;
+
+  /// The local size of the fluid at a point on a wall, in cells from the origin of the world, near
+  /// the tile. In spacings; 0 if no kernel reaches the nodes around it, 1 for equal sizes.
+  double SizeAt(const TileDirectory& directory, std::uint32_t tile, const Point& point) const;
   /// The lines near a tile.
   std::span<const std::uint32_t> EdgesNear(std::uint32_t tile) const;
 
@@ -100,13 +104,18 @@ class WallField {
   void CollectCrossings(std::int32_t row);
   void SetTile(const TileDirectory& directory, std::uint32_t tile);
   void MeasureHeights(const TileDirectory& directory, NearTile& near) const;
-  void ExtendFluid(const TileDirectory& directory, const LevelSet& level_set, double reach,
+  double ReachOf(const TileDirectory& directory, const Scale& scale, std::uint32_t tile,
+                 const Point& node) const;
+  void ExtendFluid(const TileDirectory& directory, const Scale& scale, const LevelSet& level_set,
                    NearTile& near) const;
 
   WallLines lines_;
   std::vector<std::uint32_t> near_of_tile_;  // Index in near_, kFluid or kSolid.
   std::vector<NearTile> near_;               // The first near_count_ are of this frame.
   std::size_t near_count_ = 0, pair_count_ = 0;
+  // By near tile and node: the local size at nodes beside walls, in spacings; 0 where it is not
+  // known. Empty for equal sizes.
+  std::vector<std::array<float, kTileNodes>> sizes_;
   std::vector<NearSolid> solids_;
   std::vector<std::uint32_t> edges_;
 

@@ -101,6 +101,25 @@ TEST(SizedReplay, VolumesDiametersAndRadiiGiveTheSame) {
             digest);
 }
 
+TEST(SizedReplay, AtWallsAServerGivesTheSame) {
+  const support::TemporaryFolder input;
+  WriteZones(input.Path("zones.csv"), "diameter", 1, 1);
+  const auto digest = [&](std::vector<std::string> flags) {
+    flags.insert(flags.end(), {"--sizes", "own", "--spacing", "1", "--check"});
+    return DigestOf(input.Path("zones.csv"), flags);
+  };
+  const std::vector<std::string> walls = {"--wall", "0,0,1,0", "--wall", "0,1,0,0"};
+  std::vector<std::string> flags = {"--local"};
+  const std::string free = digest(flags);
+  flags.insert(flags.end(), walls.begin(), walls.end());
+  const std::string at_walls = digest(flags);
+  EXPECT_NE(at_walls, free);
+  ServerProgram server;
+  flags = {"--server", server.address()};
+  flags.insert(flags.end(), walls.begin(), walls.end());
+  EXPECT_EQ(digest(flags), at_walls);
+}
+
 TEST(SizedReplay, GrainsComeFromDiametersRadiiOrAreasOfDiscs) {
   const support::TemporaryFolder input;
   std::vector<std::string> flags = {"--local", "--boundary", "grains", "--check"};

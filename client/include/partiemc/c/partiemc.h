@@ -164,7 +164,7 @@ typedef struct partiemc_options {
    * after wall. Wall k has wall_sizes[k] points. Two points: the endless line through them. More
    * points: a closed polygon, a tank if it is counter-clockwise, an obstacle if it is clockwise. At
    * most 1024 points together. In a periodic box, endless lines are parallel to the periodic axis,
-   * and polygons are obstacles. Excludes surfaces, slices, isovalues, own sizes and phases. */
+   * and polygons are obstacles. Excludes surfaces, slices, isovalues, grains and phases. */
   const double* walls;
   const uint32_t* wall_sizes;
   size_t wall_count;
