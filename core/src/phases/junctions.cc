@@ -12,8 +12,8 @@
 namespace partiemc {
 namespace {
 
-// At most four arcs meet in a cell. A corner of the body has two more curves.
-constexpr std::size_t kMostArcs = 4, kMostCurves = 6;
+// A corner of the body has two more curves.
+constexpr std::size_t kMostArcs = JunctionPlan::kMostArcs, kMostCurves = kMostArcs + 2;
 // Steps of the search for the point nearest to curves.
 constexpr int kSteps = 3;
 // Weight of a junction's present place, for lines that hardly determine a new one.
@@ -144,45 +144,55 @@ void TurnNormal(const Point& along, VertexNormal& normal) {
   normal = {static_cast<float>(sign * unit.x), static_cast<float>(sign * unit.y)};
 }
 
-// Moves a junction and the points near it.
-void MoveJunction(std::span<const JunctionScratch::ArcEnd> ends, const Rings& body, double h,
-                  const Interfaces& interfaces, JunctionScratch& scratch, SharedPoints& points) {
+ArcPath PathOf(const ArcEnd& end, const Interfaces& interfaces) {
+  return {interfaces.InnerPoints(interfaces.arcs[end.arc]), end.is_start};
+}
+
+// Where a junction goes. Absent if none of its arcs has a curve.
+std::optional<JunctionPlan> PlanOf(std::span<const ArcEnd> ends, const Rings& body, double h,
+                                   const Interfaces& interfaces, const JunctionScratch& scratch,
+                                   const SharedPoints& points) {
   const std::uint32_t junction = ends[0].junction;
-  const Point before = points.position[junction];
-  const auto path_of = [&](const JunctionScratch::ArcEnd& end) {
-    return ArcPath(interfaces.InnerPoints(interfaces.arcs[end.arc]), end.is_start);
-  };
+  const Point& before = points.position[junction];
+  JunctionPlan plan{.ends = ends};
   Curves curves;
   for (std::size_t k = 0; k < ends.size(); ++k) {
-    curves[k] = CurveAlong(path_of(ends[k]), before, h, points.position);
+    curves[k] = CurveAlong(PathOf(ends[k], interfaces), before, h, points.position);
+    plan.curves[k] = curves[k];
   }
-  if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) return;
+  if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) return std::nullopt;
   const bool is_body = junction < body.PointCount();
-  Point now;
-  if (!is_body) {
-    now = PlaceOf(curves, junction, false, body, h, scratch, points);
-  } else {
+  if (is_body) {
     const RingPath ahead(body, junction, true, h, scratch.is_contact, points.position);
     const RingPath back(body, junction, false, h, scratch.is_contact, points.position);
-    const auto corner = CornerOf(ahead, back, before, h, points.position);
-    scratch.has_moved[junction] = corner ? kMovedCorner : kMoved;
-    if (corner) {
+    if (const auto corner = CornerOf(ahead, back, before, h, points.position)) {
+      plan.corner = {*corner, ahead, back};
       curves[kMostArcs] = corner->ahead;
       curves[kMostArcs + 1] = corner->back;
     }
-    now = PlaceOf(curves, junction, !corner, body, h, scratch, points);
+  }
+  plan.now = PlaceOf(curves, junction, is_body && !plan.corner, body, h, scratch, points);
+  return plan;
+}
+
+// Moves a junction and the points near it.
+void Move(const JunctionPlan& plan, const Rings& body, double h, const Interfaces& interfaces,
+          std::span<std::uint8_t> has_moved, SharedPoints& points) {
+  const std::uint32_t junction = plan.ends[0].junction;
+  const Point before = points.position[junction];
+  points.position[junction] = plan.now;
+  if (junction < body.PointCount()) has_moved[junction] = plan.corner ? kMovedCorner : kMoved;
+  if (plan.corner) {
     const auto on_move = [&](std::uint32_t vertex, const Point& along) {
-      scratch.has_moved[vertex] = kMoved;
+      has_moved[vertex] = kMoved;
       TurnNormal(along, points.normal[vertex]);
     };
-    if (corner) {
-      Reshape(ahead, before, now, h, corner->ahead, points, on_move);
-      Reshape(back, before, now, h, corner->back, points, on_move);
-    }
+    const auto& [curves, ahead, back] = *plan.corner;
+    Reshape(ahead, before, plan.now, h, curves.ahead, points, on_move);
+    Reshape(back, before, plan.now, h, curves.back, points, on_move);
   }
-  points.position[junction] = now;
-  for (std::size_t k = 0; k < ends.size(); ++k) {
-    Reshape(path_of(ends[k]), before, now, h, curves[k], points,
+  for (std::size_t k = 0; k < plan.ends.size(); ++k) {
+    Reshape(PathOf(plan.ends[k], interfaces), before, plan.now, h, plan.curves[k], points,
             [](std::uint32_t, const Point&) {});
   }
 }
@@ -196,7 +206,7 @@ void CollectEnds(const Interfaces& interfaces, std::size_t body_points, Junction
     scratch.ends.push_back({arc.start, k, true});
     scratch.ends.push_back({arc.end, k, false});
   }
-  std::ranges::sort(scratch.ends, {}, [](const JunctionScratch::ArcEnd& end) {
+  std::ranges::sort(scratch.ends, {}, [](const ArcEnd& end) {
     return std::tuple(end.junction, end.arc, !end.is_start);
   });
   for (const auto& end : scratch.ends) {
@@ -210,12 +220,17 @@ void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& inte
                    JunctionScratch& scratch, SharedPoints& points) {
   CollectEnds(interfaces, body.PointCount(), scratch);
   const double h = scale.spacing;
+  scratch.plans.clear();
   for (std::size_t first = 0, last = 0; first < scratch.ends.size(); first = last) {
     const std::uint32_t junction = scratch.ends[first].junction;
     while (last < scratch.ends.size() && scratch.ends[last].junction == junction) ++last;
     const std::size_t count = std::min(last - first, kMostArcs);
-    MoveJunction(std::span(scratch.ends).subspan(first, count), body, h, interfaces, scratch,
-                 points);
+    const auto plan =
+        PlanOf(std::span(scratch.ends).subspan(first, count), body, h, interfaces, scratch, points);
+    if (plan) scratch.plans.push_back(*plan);
+  }
+  for (const JunctionPlan& plan : scratch.plans) {
+    Move(plan, body, h, interfaces, scratch.has_moved, points);
   }
 }
 

@@ -1,24 +1,48 @@
 // Moves the points where interfaces meet to where their curves meet.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <utility>
+#include <optional>
+#include <span>
 #include <vector>
 
+#include "base/point.h"
 #include "frame/scale.h"
 #include "partiemc/result.h"
+#include "phases/arc_curve.h"
+#include "phases/body_corner.h"
 #include "phases/interfaces.h"
 
 namespace partiemc {
 
+/// An end of an arc at a junction.
+struct ArcEnd {
+  std::uint32_t junction;  ///< Number of a shared point.
+  std::uint32_t arc;
+  bool is_start;
+};
+
+/// Where a junction goes, and the curves on which the points near it follow.
+struct JunctionPlan {
+  static constexpr std::size_t kMostArcs = 4;  ///< At most four arcs meet in a cell.
+  /// A corner of the body, and both sides of its ring.
+  struct Corner {
+    BodyCorner curves;
+    RingPath ahead, back;
+  };
+
+  std::span<const ArcEnd> ends;
+  Point now = {};
+  std::array<std::optional<ArcCurve>, kMostArcs> curves = {};  ///< By end.
+  std::optional<Corner> corner = {};                           ///< Absent if it is none.
+};
+
 /// Scratch of MoveJunctions.
 struct JunctionScratch {
-  struct ArcEnd {
-    std::uint32_t junction;  // Number of a shared point.
-    std::uint32_t arc;
-    bool is_start;
-  };
   std::vector<ArcEnd> ends;              // By junction, then arc.
+  std::vector<JunctionPlan> plans;       // Of the junctions that move.
   std::vector<std::uint8_t> is_contact;  // By point of the body: whether interfaces end there.
   std::vector<std::uint8_t> has_moved;   // By point of the body: 0, kMoved or kMovedCorner.
 };

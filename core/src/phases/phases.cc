@@ -140,7 +140,7 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
     move_junctions();
   }
   p.is_junction.assign(p.points.position.size(), 0);
-  for (const JunctionScratch::ArcEnd& end : p.junctions.ends) p.is_junction[end.junction] = 1;
+  for (const ArcEnd& end : p.junctions.ends) p.is_junction[end.junction] = 1;
   ToWorld(placed, body, input.scale.cell_size, p);
   if (!RepairPhases(body, p.rings, p.world_roots, p.repair, p.world)) return false;
   std::copy_n(p.world.begin(), body.points.size(), body.points.begin());
