@@ -244,7 +244,7 @@ void SumRegions(const RegionInput& input, PhaseImages& images, PhaseAreaScratch&
     }
   }
   if (!has_copies) return;
-  images.JoinImages(input.originals, s.region_of);
+  images.JoinImages(input.originals, bins.tiles, input.phases, s.region_of);
   for (std::uint32_t region = 0; region < images.RegionCount(); ++region) {
     const std::uint32_t root = images.RootOf(region);
     if (root != region) s.volume[root] += std::exchange(s.volume[region], 0);

@@ -15,6 +15,19 @@ namespace {
 
 constexpr std::size_t kItemsPerCheck = 1 << 16;
 
+struct Node {
+  std::int64_t x = 0, y = 0;
+
+  Point Position() const { return {static_cast<double>(x), static_cast<double>(y)}; }
+};
+
+TilePlace PlaceOf(const TileDirectory& directory, const Node& node) {
+  const TileCoordinate tile{static_cast<std::int32_t>(node.y >> kTileShift),
+                            static_cast<std::int32_t>(node.x >> kTileShift)};
+  return {directory.Find(tile), static_cast<int>(node.x & (kTileSize - 1)),
+          static_cast<int>(node.y & (kTileSize - 1))};
+}
+
 }  // namespace
 
 void PhaseImages::Build(const Percolation* body, const BodyOutline& outline, double cell_size,
@@ -66,8 +79,7 @@ void PhaseImages::GroupRings(const Percolation& body, const BodyOutline& outline
   }
 }
 
-bool PhaseImages::DecidesImages(std::uint32_t source, const Point& at) const {
-  if (source < particles_) return true;
+bool PhaseImages::IsInReach(const Point& at) const {
   const std::array<double, 2> coordinates{at.x, at.y};
   for (std::size_t k = 0; k < coordinates.size(); ++k) {
     const std::optional<PeriodicAxis>& axis = window_.axes[k];
@@ -78,10 +90,14 @@ bool PhaseImages::DecidesImages(std::uint32_t source, const Point& at) const {
   return true;
 }
 
-void PhaseImages::JoinImages(std::span<const std::uint32_t> originals,
-                             std::span<std::uint32_t> region_of) {
-  root_.resize(RegionCount());
-  std::iota(root_.begin(), root_.end(), 0u);
+void PhaseImages::Join(std::uint32_t a, std::uint32_t b) {
+  a = partiemc::RootOf(root_, a);
+  b = partiemc::RootOf(root_, b);
+  root_[std::max(a, b)] = std::min(a, b);
+}
+
+void PhaseImages::JoinByParticles(std::span<const std::uint32_t> originals,
+                                  std::span<std::uint32_t> region_of) {
   for (std::size_t copy = 0; copy < originals.size(); ++copy) {
     if (copy % kItemsPerCheck == 0) ThrowIfCancelled();
     const std::uint32_t of_copy = region_of[particles_ + copy];
@@ -89,11 +105,53 @@ void PhaseImages::JoinImages(std::span<const std::uint32_t> originals,
     std::uint32_t& of_given = region_of[originals[copy]];
     // The lattice lies differently at a copy. Further copies join the region of this copy.
     if (of_given == kNoComponent) of_given = of_copy;
-    if (!IsCut(of_given)) continue;
-    const std::uint32_t a = partiemc::RootOf(root_, of_copy);
-    const std::uint32_t b = partiemc::RootOf(root_, of_given);
-    root_[std::max(a, b)] = std::min(a, b);
+    if (IsCut(of_given)) Join(of_copy, of_given);
   }
+}
+
+void PhaseImages::JoinByNodes(const TileDirectory& directory, std::span<const PhaseRings> phases,
+                              std::span<const std::uint32_t> region_of) {
+  is_empty_.resize(RegionCount());
+  for (std::uint32_t region = 0; region < RegionCount(); ++region) {
+    is_empty_[region] = IsCut(region) ? 1 : 0;
+  }
+  for (const std::uint32_t region : region_of) {
+    if (region != kNoComponent) is_empty_[region] = 0;
+  }
+  if (std::ranges::find(is_empty_, std::uint8_t{1}) == is_empty_.end()) return;
+  const auto cells = [&](std::size_t axis) {
+    return window_.axes[axis] ? std::llround(window_.axes[axis]->length) : 0;
+  };
+  const std::int64_t x = cells(0), y = cells(1);
+  const std::array<Node, 4> shifts{{{x, 0}, {0, y}, {x, y}, {x, -y}}};
+  for (std::size_t phase = 0; phase < phases.size(); ++phase) {
+    const Components& components = phases[phase].topology.components;
+    const Crossings& crossings = phases[phase].crossings;
+    components.ForEachRun(
+        crossings, [&](std::uint32_t tile, int j, std::uint32_t mask, std::uint32_t component) {
+          const std::uint32_t region = RegionOf(phase, component);
+          if (is_empty_[region] == 0) return;
+          const Node node{(std::int64_t{directory[tile].x} << kTileShift) + std::countr_zero(mask),
+                          (std::int64_t{directory[tile].y} << kTileShift) + j};
+          if (!IsInReach(node.Position())) return;
+          for (const Node& shift : shifts) {
+            const Node image{node.x + shift.x, node.y + shift.y};
+            const TilePlace place = PlaceOf(directory, image);
+            if (!IsInside(crossings, place) || !IsInReach(image.Position())) continue;
+            const std::uint32_t other = RegionOf(phase, components.At(crossings, place));
+            if (is_empty_[other] != 0) Join(region, other);
+          }
+        });
+  }
+}
+
+void PhaseImages::JoinImages(std::span<const std::uint32_t> originals,
+                             const TileDirectory& directory, std::span<const PhaseRings> phases,
+                             std::span<std::uint32_t> region_of) {
+  root_.resize(RegionCount());
+  std::iota(root_.begin(), root_.end(), 0u);
+  JoinByParticles(originals, region_of);
+  JoinByNodes(directory, phases, region_of);
   bodies_.resize(RegionCount());
   for (std::size_t phase = 0; phase + 1 < first_.size(); ++phase) {
     for (std::uint32_t region = first_[phase]; region < first_[phase + 1]; ++region) {

@@ -24,11 +24,13 @@ class PhaseImages {
   void Build(const Percolation* body, const BodyOutline& outline, double cell_size,
              std::span<const PhaseRings> phases);
 
-  /// Joins the regions that will be cut and share a particle: they are images of one region.
-  /// `region_of`: by particle of the frame, the region of its phase in which it lies, or
-  /// kNoComponent, also if it does not decide (DecidesImages). `originals`: by copy, its particle.
-  /// Changes `region_of`. Cost: linear in particles.
-  void JoinImages(std::span<const std::uint32_t> originals, std::span<std::uint32_t> region_of);
+  /// Joins the regions that will be cut and are images of one region. Those share a particle. Those
+  /// without particles of their phase share a node, up to whole lengths of the window. `region_of`:
+  /// by particle of the frame, the region of its phase in which it lies, or kNoComponent, also if
+  /// it does not decide (DecidesImages). `originals`: by copy, its particle. Changes `region_of`.
+  /// Cost: linear in particles; in runs of inside nodes if a region has no particles.
+  void JoinImages(std::span<const std::uint32_t> originals, const TileDirectory& directory,
+                  std::span<const PhaseRings> phases, std::span<std::uint32_t> region_of);
 
   std::uint32_t RegionCount() const { return first_.back(); }
   std::uint32_t RegionOf(std::size_t phase, std::uint32_t component) const {
@@ -50,7 +52,9 @@ class PhaseImages {
   /// Whether the region of a particle decides which regions are images of each other. False for
   /// copies so far from the window that copies around them are missing: their regions may be wrong.
   /// `at`: the particle's place in cells.
-  bool DecidesImages(std::uint32_t source, const Point& at) const;
+  bool DecidesImages(std::uint32_t source, const Point& at) const {
+    return source < particles_ || IsInReach(at);
+  }
   /// The group of a ring of the body, by its first ring. The outer rings of a body that will be cut
   /// are a group. Each other ring is one, too.
   std::uint32_t GroupOf(std::uint32_t ring) const {
@@ -66,6 +70,12 @@ class PhaseImages {
 
  private:
   void GroupRings(const Percolation& body, const BodyOutline& outline);
+  bool IsInReach(const Point& at) const;
+  void JoinByParticles(std::span<const std::uint32_t> originals,
+                       std::span<std::uint32_t> region_of);
+  void JoinByNodes(const TileDirectory& directory, std::span<const PhaseRings> phases,
+                   std::span<const std::uint32_t> region_of);
+  void Join(std::uint32_t a, std::uint32_t b);
 
   std::vector<std::uint32_t> first_{0};  // By phase: its first region. Then the number of regions.
   bool has_copies_ = false;
@@ -73,6 +83,7 @@ class PhaseImages {
   std::vector<Fate> fates_;            // By region.
   std::vector<std::uint32_t> root_;    // By region: an earlier image, or itself. Empty: themselves.
   std::vector<std::uint32_t> bodies_;  // By region: the component of the first image.
+  std::vector<std::uint8_t> is_empty_;      // By region: will be cut, has no particles. Scratch.
   std::vector<std::uint32_t> ring_groups_;  // By ring of the body: its group, or kNoRing.
   std::vector<std::uint32_t> first_ring_;   // By component of the body. Scratch.
   Window window_;
