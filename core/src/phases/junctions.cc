@@ -1,9 +1,13 @@
 #include "phases/junctions.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
+#include <tuple>
 
 #include "phases/arc_curve.h"
 #include "phases/body_corner.h"
@@ -25,6 +29,9 @@ constexpr double kLongestMove = 1.5;
 constexpr double kShare = .9, kSharedShare = .45;
 // A line that meets the ring at a smaller angle, given by its sine, does not determine a place.
 constexpr double kSmallestSine = .3;
+// The anchors of images differ by whole lengths up to this error, in cells. The anchors of contacts
+// are computed with single precision.
+constexpr double kImageError = 1e-3;
 
 Point Between(const Point& from, const Point& to) { return Minus(to, from); }
 
@@ -148,10 +155,9 @@ ArcPath PathOf(const ArcEnd& end, const Interfaces& interfaces) {
   return {interfaces.InnerPoints(interfaces.arcs[end.arc]), end.is_start};
 }
 
-// Where a junction goes. Absent if none of its arcs has a curve.
-std::optional<JunctionPlan> PlanOf(std::span<const ArcEnd> ends, const Rings& body, double h,
-                                   const Interfaces& interfaces, const JunctionScratch& scratch,
-                                   const SharedPoints& points) {
+JunctionPlan PlanOf(std::span<const ArcEnd> ends, const Rings& body, double h,
+                    const Interfaces& interfaces, const JunctionScratch& scratch,
+                    const SharedPoints& points) {
   const std::uint32_t junction = ends[0].junction;
   const Point& before = points.position[junction];
   JunctionPlan plan{.ends = ends};
@@ -160,7 +166,8 @@ std::optional<JunctionPlan> PlanOf(std::span<const ArcEnd> ends, const Rings& bo
     curves[k] = CurveAlong(PathOf(ends[k], interfaces), before, h, points.position);
     plan.curves[k] = curves[k];
   }
-  if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) return std::nullopt;
+  if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) return plan;
+  plan.moves = true;
   const bool is_body = junction < body.PointCount();
   if (is_body) {
     const RingPath ahead(body, junction, true, h, scratch.is_contact, points.position);
@@ -171,7 +178,8 @@ std::optional<JunctionPlan> PlanOf(std::span<const ArcEnd> ends, const Rings& bo
       curves[kMostArcs + 1] = corner->back;
     }
   }
-  plan.now = PlaceOf(curves, junction, is_body && !plan.corner, body, h, scratch, points);
+  const bool is_on_ring = is_body && !plan.corner;
+  plan.move = Between(before, PlaceOf(curves, junction, is_on_ring, body, h, scratch, points));
   return plan;
 }
 
@@ -179,8 +187,8 @@ std::optional<JunctionPlan> PlanOf(std::span<const ArcEnd> ends, const Rings& bo
 void Move(const JunctionPlan& plan, const Rings& body, double h, const Interfaces& interfaces,
           std::span<std::uint8_t> has_moved, SharedPoints& points) {
   const std::uint32_t junction = plan.ends[0].junction;
-  const Point before = points.position[junction];
-  points.position[junction] = plan.now;
+  const Point before = points.position[junction], now = Plus(before, plan.move);
+  points.position[junction] = now;
   if (junction < body.PointCount()) has_moved[junction] = plan.corner ? kMovedCorner : kMoved;
   if (plan.corner) {
     const auto on_move = [&](std::uint32_t vertex, const Point& along) {
@@ -188,12 +196,68 @@ void Move(const JunctionPlan& plan, const Rings& body, double h, const Interface
       TurnNormal(along, points.normal[vertex]);
     };
     const auto& [curves, ahead, back] = *plan.corner;
-    Reshape(ahead, before, plan.now, h, curves.ahead, points, on_move);
-    Reshape(back, before, plan.now, h, curves.back, points, on_move);
+    Reshape(ahead, before, now, h, curves.ahead, points, on_move);
+    Reshape(back, before, now, h, curves.back, points, on_move);
   }
   for (std::size_t k = 0; k < plan.ends.size(); ++k) {
-    Reshape(PathOf(plan.ends[k], interfaces), before, plan.now, h, plan.curves[k], points,
+    Reshape(PathOf(plan.ends[k], interfaces), before, now, h, plan.curves[k], points,
             [](std::uint32_t, const Point&) {});
+  }
+}
+
+// The lengths of the window in whole cells. Absent without one, and if it is no whole number.
+std::array<std::optional<std::int64_t>, 2> WholeLengths(const Window& window) {
+  std::array<std::optional<std::int64_t>, 2> lengths;
+  for (std::size_t k = 0; k < lengths.size(); ++k) {
+    if (!window.axes[k]) continue;
+    const double length = window.axes[k]->length, whole = std::round(length);
+    if (std::abs(length - whole) < kImageError) lengths[k] = static_cast<std::int64_t>(whole);
+  }
+  return lengths;
+}
+
+void CollectImages(const Window& window, std::span<const Point> anchors, JunctionScratch& scratch) {
+  scratch.images.clear();
+  const auto lengths = WholeLengths(window);
+  for (std::uint32_t plan = 0; plan < scratch.plans.size(); ++plan) {
+    const Point& anchor = anchors[scratch.plans[plan].ends[0].junction];
+    JunctionImage image{.anchor = anchor, .plan = plan};
+    const std::array<double, 2> at{anchor.x, anchor.y};
+    for (std::size_t k = 0; k < lengths.size(); ++k) {
+      image.cell[k] = static_cast<std::int64_t>(std::floor(at[k]));
+      if (!lengths[k]) continue;
+      image.cell[k] = (image.cell[k] % *lengths[k] + *lengths[k]) % *lengths[k];
+      const double away = at[k] - window.axes[k]->origin - window.axes[k]->length / 2;
+      image.distance += away * away;
+    }
+    scratch.images.push_back(image);
+  }
+  std::ranges::sort(scratch.images, {}, [](const JunctionImage& image) {
+    return std::tuple(image.cell, image.distance, image.anchor.x, image.anchor.y, image.plan);
+  });
+}
+
+// Whether two junctions in the same cell, up to lengths of the window, are images of each other.
+bool AreImages(const JunctionImage& a, const JunctionImage& b, const JunctionScratch& scratch) {
+  const auto is_whole = [](double x) { return std::abs(x - std::round(x)) < kImageError; };
+  return a.cell == b.cell && is_whole(a.anchor.x - b.anchor.x) &&
+         is_whole(a.anchor.y - b.anchor.y) &&
+         scratch.plans[a.plan].ends.size() == scratch.plans[b.plan].ends.size();
+}
+
+// Gives each junction the move of its image nearest to the middle of the box.
+void MoveImagesAlike(const PhaseImages& images, std::span<const Point> anchors,
+                     JunctionScratch& scratch) {
+  if (!images.HasCopies()) return;
+  CollectImages(images.window(), anchors, scratch);
+  for (std::size_t k = 1, first = 0; k < scratch.images.size(); ++k) {
+    const JunctionImage& image = scratch.images[k];
+    if (image.cell != scratch.images[first].cell) first = k;
+    std::size_t nearest = first;
+    while (!AreImages(scratch.images[nearest], image, scratch)) ++nearest;
+    const JunctionPlan& plan = scratch.plans[scratch.images[nearest].plan];
+    scratch.plans[image.plan].moves = plan.moves;
+    scratch.plans[image.plan].move = plan.move;
   }
 }
 
@@ -217,7 +281,7 @@ void CollectEnds(const Interfaces& interfaces, std::size_t body_points, Junction
 }  // namespace
 
 void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,
-                   JunctionScratch& scratch, SharedPoints& points) {
+                   const PhaseImages& images, JunctionScratch& scratch, SharedPoints& points) {
   CollectEnds(interfaces, body.PointCount(), scratch);
   const double h = scale.spacing;
   scratch.plans.clear();
@@ -225,12 +289,12 @@ void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& inte
     const std::uint32_t junction = scratch.ends[first].junction;
     while (last < scratch.ends.size() && scratch.ends[last].junction == junction) ++last;
     const std::size_t count = std::min(last - first, kMostArcs);
-    const auto plan =
-        PlanOf(std::span(scratch.ends).subspan(first, count), body, h, interfaces, scratch, points);
-    if (plan) scratch.plans.push_back(*plan);
+    const auto ends = std::span(scratch.ends).subspan(first, count);
+    scratch.plans.push_back(PlanOf(ends, body, h, interfaces, scratch, points));
   }
+  MoveImagesAlike(images, points.anchor, scratch);
   for (const JunctionPlan& plan : scratch.plans) {
-    Move(plan, body, h, interfaces, scratch.has_moved, points);
+    if (plan.moves) Move(plan, body, h, interfaces, scratch.has_moved, points);
   }
 }
 

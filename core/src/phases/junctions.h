@@ -14,6 +14,7 @@
 #include "phases/arc_curve.h"
 #include "phases/body_corner.h"
 #include "phases/interfaces.h"
+#include "phases/phase_images.h"
 
 namespace partiemc {
 
@@ -34,15 +35,25 @@ struct JunctionPlan {
   };
 
   std::span<const ArcEnd> ends;
-  Point now = {};
+  bool moves = false;  ///< Whether an arc has a curve.
+  Point move = {};
   std::array<std::optional<ArcCurve>, kMostArcs> curves = {};  ///< By end.
   std::optional<Corner> corner = {};                           ///< Absent if it is none.
+};
+
+/// A junction in a periodic box.
+struct JunctionImage {
+  std::array<std::int64_t, 2> cell;  ///< Of the anchor, the same for all images.
+  double distance;                   ///< Square of the distance from the middle of the box.
+  Point anchor;
+  std::uint32_t plan;
 };
 
 /// Scratch of MoveJunctions.
 struct JunctionScratch {
   std::vector<ArcEnd> ends;              // By junction, then arc.
-  std::vector<JunctionPlan> plans;       // Of the junctions that move.
+  std::vector<JunctionPlan> plans;       // By junction.
+  std::vector<JunctionImage> images;     // By cell, nearest to the middle of the box first.
   std::vector<std::uint8_t> is_contact;  // By point of the body: whether interfaces end there.
   std::vector<std::uint8_t> has_moved;   // By point of the body: 0, kMoved or kMovedCorner.
 };
@@ -56,9 +67,12 @@ struct JunctionScratch {
 /// - If the body has a corner there (body_corner.h), the curves of both sides of the ring count,
 ///   too. The junction may then move in any direction. The vertices of the ring up to about 1.5
 ///   spacings away follow, with turned normals.
+/// All moves are planned before any junction moves, so their order does not matter. In a periodic
+/// box whose lengths are whole numbers of cells, the images of a junction move as the image nearest
+/// to the middle of the box. Far from the box, copies are missing and curves may differ.
 /// Sets has_moved of the body's points that move. Requires: has_moved has an element for each point
 /// of the body. Cost: linear in the points near junctions.
 void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,
-                   JunctionScratch& scratch, SharedPoints& points);
+                   const PhaseImages& images, JunctionScratch& scratch, SharedPoints& points);
 
 }  // namespace partiemc

@@ -126,7 +126,7 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   p.images.Build(input.percolation, outline, input.scale.cell_size, p.rings);
   p.ring_areas.Measure(body, p.images, p.points.position);
   const auto move_junctions = [&] {
-    MoveJunctions(input.scale, body, p.interfaces, p.junctions, p.points);
+    MoveJunctions(input.scale, body, p.interfaces, p.images, p.junctions, p.points);
     p.ring_areas.Restore(body, p.images, kCornerLimit * input.scale.spacing, p.junctions.has_moved,
                          p.points);
   };
