@@ -17,7 +17,7 @@ namespace partiemc {
 namespace {
 
 // A corner of the body has two more curves.
-constexpr std::size_t kMostArcs = JunctionPlan::kMostArcs, kMostCurves = kMostArcs + 2;
+constexpr std::size_t kMostCurves = kMostArcs + 2;
 // Steps of the search for the point nearest to curves.
 constexpr int kSteps = 3;
 // Weight of a junction's present place, for lines that hardly determine a new one.
@@ -160,47 +160,50 @@ JunctionPlan PlanOf(std::span<const ArcEnd> ends, const Rings& body, double h,
                     const SharedPoints& points) {
   const std::uint32_t junction = ends[0].junction;
   const Point& before = points.position[junction];
+  const auto side = [&](bool is_ahead) {
+    return RingPath(body, junction, is_ahead, h, scratch.is_contact, points.position);
+  };
   JunctionPlan plan{.ends = ends};
+  const bool is_body = junction < body.PointCount();
+  if (is_body) plan.ring = {side(true), side(false)};
+  JunctionMove move;
   Curves curves;
   for (std::size_t k = 0; k < ends.size(); ++k) {
     curves[k] = CurveAlong(PathOf(ends[k], interfaces), before, h, points.position);
-    plan.curves[k] = curves[k];
+    move.curves[k] = curves[k];
   }
   if (std::ranges::none_of(curves, &std::optional<ArcCurve>::has_value)) return plan;
-  plan.moves = true;
-  const bool is_body = junction < body.PointCount();
   if (is_body) {
-    const RingPath ahead(body, junction, true, h, scratch.is_contact, points.position);
-    const RingPath back(body, junction, false, h, scratch.is_contact, points.position);
-    if (const auto corner = CornerOf(ahead, back, before, h, points.position)) {
-      plan.corner = {*corner, ahead, back};
-      curves[kMostArcs] = corner->ahead;
-      curves[kMostArcs + 1] = corner->back;
-    }
+    move.corner = CornerOf(plan.ring->ahead, plan.ring->back, before, h, points.position);
   }
-  const bool is_on_ring = is_body && !plan.corner;
-  plan.move = Between(before, PlaceOf(curves, junction, is_on_ring, body, h, scratch, points));
+  if (move.corner) {
+    curves[kMostArcs] = move.corner->ahead;
+    curves[kMostArcs + 1] = move.corner->back;
+  }
+  const bool is_on_ring = is_body && !move.corner;
+  move.step = Between(before, PlaceOf(curves, junction, is_on_ring, body, h, scratch, points));
+  plan.move = move;
   return plan;
 }
 
 // Moves a junction and the points near it.
-void Move(const JunctionPlan& plan, const Rings& body, double h, const Interfaces& interfaces,
+void Move(const JunctionPlan& plan, double h, const Interfaces& interfaces,
           std::span<std::uint8_t> has_moved, SharedPoints& points) {
   const std::uint32_t junction = plan.ends[0].junction;
-  const Point before = points.position[junction], now = Plus(before, plan.move);
+  const JunctionMove& move = *plan.move;
+  const Point before = points.position[junction], now = Plus(before, move.step);
   points.position[junction] = now;
-  if (junction < body.PointCount()) has_moved[junction] = plan.corner ? kMovedCorner : kMoved;
-  if (plan.corner) {
+  if (plan.ring) has_moved[junction] = move.corner ? kMovedCorner : kMoved;
+  if (plan.ring && move.corner) {
     const auto on_move = [&](std::uint32_t vertex, const Point& along) {
       has_moved[vertex] = kMoved;
       TurnNormal(along, points.normal[vertex]);
     };
-    const auto& [curves, ahead, back] = *plan.corner;
-    Reshape(ahead, before, now, h, curves.ahead, points, on_move);
-    Reshape(back, before, now, h, curves.back, points, on_move);
+    Reshape(plan.ring->ahead, before, now, h, move.corner->ahead, points, on_move);
+    Reshape(plan.ring->back, before, now, h, move.corner->back, points, on_move);
   }
   for (std::size_t k = 0; k < plan.ends.size(); ++k) {
-    Reshape(PathOf(plan.ends[k], interfaces), before, now, h, plan.curves[k], points,
+    Reshape(PathOf(plan.ends[k], interfaces), before, now, h, move.curves[k], points,
             [](std::uint32_t, const Point&) {});
   }
 }
@@ -237,12 +240,13 @@ void CollectImages(const Window& window, std::span<const Point> anchors, Junctio
   });
 }
 
-// Whether two junctions in the same cell, up to lengths of the window, are images of each other.
+// Whether two junctions are images of each other.
 bool AreImages(const JunctionImage& a, const JunctionImage& b, const JunctionScratch& scratch) {
   const auto is_whole = [](double x) { return std::abs(x - std::round(x)) < kImageError; };
+  const JunctionPlan &p = scratch.plans[a.plan], &q = scratch.plans[b.plan];
   return a.cell == b.cell && is_whole(a.anchor.x - b.anchor.x) &&
-         is_whole(a.anchor.y - b.anchor.y) &&
-         scratch.plans[a.plan].ends.size() == scratch.plans[b.plan].ends.size();
+         is_whole(a.anchor.y - b.anchor.y) && p.ends.size() == q.ends.size() &&
+         p.ring.has_value() == q.ring.has_value();
 }
 
 // Gives each junction the move of its image nearest to the middle of the box.
@@ -255,9 +259,7 @@ void MoveImagesAlike(const PhaseImages& images, std::span<const Point> anchors,
     if (image.cell != scratch.images[first].cell) first = k;
     std::size_t nearest = first;
     while (!AreImages(scratch.images[nearest], image, scratch)) ++nearest;
-    const JunctionPlan& plan = scratch.plans[scratch.images[nearest].plan];
-    scratch.plans[image.plan].moves = plan.moves;
-    scratch.plans[image.plan].move = plan.move;
+    scratch.plans[image.plan].move = scratch.plans[scratch.images[nearest].plan].move;
   }
 }
 
@@ -270,8 +272,11 @@ void CollectEnds(const Interfaces& interfaces, std::size_t body_points, Junction
     scratch.ends.push_back({arc.start, k, true});
     scratch.ends.push_back({arc.end, k, false});
   }
-  std::ranges::sort(scratch.ends, {}, [](const ArcEnd& end) {
-    return std::tuple(end.junction, end.arc, !end.is_start);
+  // Images of a junction have their ends in the same order: no two ends at a junction have the same
+  // phases and direction.
+  std::ranges::sort(scratch.ends, {}, [&](const ArcEnd& end) {
+    const PhaseArc& arc = interfaces.arcs[end.arc];
+    return std::tuple(end.junction, arc.left, arc.right, !end.is_start, end.arc);
   });
   for (const auto& end : scratch.ends) {
     if (end.junction < body_points) scratch.is_contact[end.junction] = 1;
@@ -294,7 +299,7 @@ void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& inte
   }
   MoveImagesAlike(images, points.anchor, scratch);
   for (const JunctionPlan& plan : scratch.plans) {
-    if (plan.moves) Move(plan, body, h, interfaces, scratch.has_moved, points);
+    if (plan.move) Move(plan, h, interfaces, scratch.has_moved, points);
   }
 }
 

@@ -25,20 +25,26 @@ struct ArcEnd {
   bool is_start;
 };
 
-/// Where a junction goes, and the curves on which the points near it follow.
+/// At most four arcs meet in a cell.
+inline constexpr std::size_t kMostArcs = 4;
+
+/// Where a junction goes, and the curves on which the points near it follow. All are relative to
+/// the junction.
+struct JunctionMove {
+  Point step;
+  std::array<std::optional<ArcCurve>, kMostArcs> curves;  ///< By end.
+  std::optional<BodyCorner> corner;                       ///< Of the body's outline.
+};
+
 struct JunctionPlan {
-  static constexpr std::size_t kMostArcs = 4;  ///< At most four arcs meet in a cell.
-  /// A corner of the body, and both sides of its ring.
-  struct Corner {
-    BodyCorner curves;
+  /// Both sides of a contact.
+  struct RingSides {
     RingPath ahead, back;
   };
 
   std::span<const ArcEnd> ends;
-  bool moves = false;  ///< Whether an arc has a curve.
-  Point move = {};
-  std::array<std::optional<ArcCurve>, kMostArcs> curves = {};  ///< By end.
-  std::optional<Corner> corner = {};                           ///< Absent if it is none.
+  std::optional<RingSides> ring;     ///< Absent inside of the body.
+  std::optional<JunctionMove> move;  ///< Absent if no arc has a curve.
 };
 
 /// A junction in a periodic box.
@@ -51,7 +57,7 @@ struct JunctionImage {
 
 /// Scratch of MoveJunctions.
 struct JunctionScratch {
-  std::vector<ArcEnd> ends;              // By junction, then arc.
+  std::vector<ArcEnd> ends;              // By junction, then by the phases on both sides.
   std::vector<JunctionPlan> plans;       // By junction.
   std::vector<JunctionImage> images;     // By cell, nearest to the middle of the box first.
   std::vector<std::uint8_t> is_contact;  // By point of the body: whether interfaces end there.
