@@ -155,6 +155,7 @@ ArcPath PathOf(const ArcEnd& end, const Interfaces& interfaces) {
   return {interfaces.InnerPoints(interfaces.arcs[end.arc]), end.is_start};
 }
 
+// Reads positions only, so that plans do not depend on each other.
 JunctionPlan PlanOf(std::span<const ArcEnd> ends, const Rings& body, double h,
                     const Interfaces& interfaces, const JunctionScratch& scratch,
                     const SharedPoints& points) {
@@ -240,13 +241,12 @@ void CollectImages(const Window& window, std::span<const Point> anchors, Junctio
   });
 }
 
-// Whether two junctions are images of each other.
+// Whether two junctions of the same cell are images of each other.
 bool AreImages(const JunctionImage& a, const JunctionImage& b, const JunctionScratch& scratch) {
   const auto is_whole = [](double x) { return std::abs(x - std::round(x)) < kImageError; };
   const JunctionPlan &p = scratch.plans[a.plan], &q = scratch.plans[b.plan];
-  return a.cell == b.cell && is_whole(a.anchor.x - b.anchor.x) &&
-         is_whole(a.anchor.y - b.anchor.y) && p.ends.size() == q.ends.size() &&
-         p.ring.has_value() == q.ring.has_value();
+  return is_whole(a.anchor.x - b.anchor.x) && is_whole(a.anchor.y - b.anchor.y) &&
+         p.ends.size() == q.ends.size() && p.ring.has_value() == q.ring.has_value();
 }
 
 // Gives each junction the move of its image nearest to the middle of the box.
@@ -258,7 +258,7 @@ void MoveImagesAlike(const PhaseImages& images, std::span<const Point> anchors,
     const JunctionImage& image = scratch.images[k];
     if (image.cell != scratch.images[first].cell) first = k;
     std::size_t nearest = first;
-    while (!AreImages(scratch.images[nearest], image, scratch)) ++nearest;
+    while (nearest < k && !AreImages(scratch.images[nearest], image, scratch)) ++nearest;
     scratch.plans[image.plan].move = scratch.plans[scratch.images[nearest].plan].move;
   }
 }
@@ -298,6 +298,8 @@ void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& inte
     scratch.plans.push_back(PlanOf(ends, body, h, interfaces, scratch, points));
   }
   MoveImagesAlike(images, points.anchor, scratch);
+  // The order does not matter: Reshape moves a point from one end of its path only, and no move
+  // reads a point that another one moves.
   for (const JunctionPlan& plan : scratch.plans) {
     if (plan.move) Move(plan, h, interfaces, scratch.has_moved, points);
   }

@@ -28,16 +28,17 @@ struct ArcEnd {
 /// At most four arcs meet in a cell.
 inline constexpr std::size_t kMostArcs = 4;
 
-/// Where a junction goes, and the curves on which the points near it follow. All are relative to
-/// the junction.
+/// How a junction moves, and the curves that the points near it follow. All are relative to the
+/// junction.
 struct JunctionMove {
   Point step;
   std::array<std::optional<ArcCurve>, kMostArcs> curves;  ///< By end.
   std::optional<BodyCorner> corner;                       ///< Of the body's outline.
 };
 
+/// A junction before it moves.
 struct JunctionPlan {
-  /// Both sides of a contact.
+  /// The vertices of the body on both sides of a contact.
   struct RingSides {
     RingPath ahead, back;
   };
@@ -75,9 +76,10 @@ struct JunctionScratch {
 ///   spacings away follow, with turned normals.
 /// All moves are planned before any junction moves, so their order does not matter. In a periodic
 /// box whose lengths are whole numbers of cells, the images of a junction move as the image nearest
-/// to the middle of the box. Far from the box, copies are missing and curves may differ.
+/// to the middle of the box. Far from the box, copies are missing, and curves may differ.
 /// Sets has_moved of the body's points that move. Requires: has_moved has an element for each point
-/// of the body. Cost: linear in the points near junctions.
+/// of the body; PhaseImages::Build. Cost: linear in the points near junctions, and n log n for n
+/// junctions.
 void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,
                    const PhaseImages& images, JunctionScratch& scratch, SharedPoints& points);
 
