@@ -150,10 +150,13 @@ absl::Status AddWalls(const ReplayFlags& flags, ReconstructionParameters& parame
           "floor y = 0; a surface has --wall-plane z=0");
     }
     if (text.find('=') != std::string::npos) {
-      const std::string attribute = parameters.phase_attribute;
-      const bool is_other = !parameters.wall_phases.empty() && AttributeOf(text) != attribute;
-      if (is_other || !ParsePhases(text, parameters.phase_attribute, parameters.wall_phases)) {
-        return WrongFlag("--wall", text, "one attribute and whole numbers, such as type=2");
+      const std::string known = !flags.phases.empty()             ? AttributeOf(flags.phases)
+                                : !parameters.wall_phases.empty() ? parameters.phase_attribute
+                                                                  : AttributeOf(text);
+      if (AttributeOf(text) != known ||
+          !ParsePhases(text, parameters.phase_attribute, parameters.wall_phases)) {
+        return WrongFlag("--wall", text,
+                         "one attribute, that of --phases, and whole numbers, such as type=2");
       }
       continue;
     }

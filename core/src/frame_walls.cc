@@ -106,6 +106,7 @@ absl::Status FindImages(const FrameWallsInput& input, FrameMemory& memory, Works
 ReconstructionParameters WallParametersOf(const ReconstructionParameters& parameters) {
   ReconstructionParameters of = parameters;
   of.walls.clear();
+  of.sections.clear();
   of.box.reset();  // Wall particles have images in its place.
   of.fill = Fill::kNone;
   of.min_component_area = 0;

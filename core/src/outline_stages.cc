@@ -213,7 +213,7 @@ absl::Status FillRings(const FillTask& task, Workspace::Buffers& b, Result& resu
 absl::Status DividePhases(const OutlineTask& task, const Frame& frame, const Scale& scale,
                           FrameMemory& memory, Workspace::Buffers& b, Rings& rings) {
   PhaseInput input{frame,  task.parameters, task.variant, scale,
-                   b.bins, b.crossings,     b.topology,   b.vertex_scratch.vertices};
+                   b.bins, b.crossings,     b.topology,   b.vertex_scratch};
   if (b.last.percolation) {
     input.percolation = &*b.last.percolation;
     input.originals = task.prepared->lifted.originals;

@@ -208,21 +208,21 @@ absl::Status Reconstructor::ReconstructOrThrow(const Frame& given, State& state,
   Frame frame = given;
   status = ResolveBox(parameters_.box, frame);
   if (!status.ok()) return status;
-  if (HasPhases(parameters_)) {
-    status = CheckFrame(given, parameters_, limits_, b.distinct_ids);
-    if (!status.ok()) return status;
-    status = TakePhases(given, parameters_, b.phases, b.attributes);
-    if (!status.ok()) return status;
-    frame.attributes = b.attributes;
-  }
   Prepared prepared;
   const bool has_wall_particles = !parameters_.wall_phases.empty();
-  if (has_wall_particles) {
+  if (has_wall_particles || HasPhases(parameters_)) {
     status = CheckFrame(given, parameters_, limits_, b.distinct_ids);
     if (!status.ok()) return status;
+  }
+  if (has_wall_particles) {
     status = TakeWallParticles(frame, parameters_, state, memory, b, prepared);
     if (!status.ok()) return status;
     frame = b.wall_particles.fluid();
+  }
+  if (HasPhases(parameters_)) {
+    status = TakePhases(frame, parameters_, b.phases, b.attributes);
+    if (!status.ok()) return status;
+    frame.attributes = b.attributes;
   }
   Prepare(frame.attributes, parameters_, result);
   if (is_prepared) {

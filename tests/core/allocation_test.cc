@@ -219,15 +219,19 @@ TEST(WarmFrameBox, AllocatesNothing) {
 }
 
 // Bodies that slide along a floor around an obstacle, with walls as lines and as particles, also in
-// a periodic box, and of own sizes.
-class WarmFrameAtWalls : public testing::TestWithParam<std::tuple<bool, bool, Sizes>> {};
+// a periodic box, of own sizes, and of two phases.
+enum class Matter { kPlain, kSized, kPhases };
+class WarmFrameAtWalls : public testing::TestWithParam<std::tuple<bool, bool, Matter>> {};
 INSTANTIATE_TEST_SUITE_P(AreParticlesInBox, WarmFrameAtWalls,
                          testing::Combine(testing::Bool(), testing::Bool(),
-                                          testing::Values(Sizes::kEqual, Sizes::kOwn)));
+                                          testing::Values(Matter::kPlain, Matter::kSized,
+                                                          Matter::kPhases)));
 
 TEST_P(WarmFrameAtWalls, AllocatesNothing) {
-  const auto [are_particles, in_box, sizes] = GetParam();
-  ReconstructionParameters parameters{.spacing = 1.0, .sizes = sizes};
+  const auto [are_particles, in_box, matter] = GetParam();
+  ReconstructionParameters parameters{.spacing = 1.0};
+  if (matter == Matter::kSized) parameters.sizes = Sizes::kOwn;
+  if (matter == Matter::kPhases) parameters.sections = {{.phase = 1}, {.phase = 3}};
   if (in_box) parameters.box = PeriodicBox{.axes = {PeriodicAxis{-20, 120}}};
   if (are_particles) {
     parameters.wall_phases = {2};
@@ -246,7 +250,10 @@ TEST_P(WarmFrameAtWalls, AllocatesNothing) {
       frame.phases.resize(frame.size(), 2);
     }
     for (std::size_t id = 0; id < frame.size(); ++id) frame.ids.push_back(id);
-    if (sizes == Sizes::kOwn) frame.volumes = VaryingVolumes(frame.size());
+    if (matter == Matter::kSized) frame.volumes = VaryingVolumes(frame.size());
+    for (std::size_t i = 0; i < frame.size(); i += 3) {
+      if (matter == Matter::kPhases && frame.phases[i] == 1) frame.phases[i] = 3;
+    }
     frames.push_back(frame);
   }
   State state;

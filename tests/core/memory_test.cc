@@ -89,6 +89,8 @@ std::vector<MemoryCase> MemoryCases(Carried carried) {
       {.sizes = Sizes::kOwn, .walls = tank});
   add("drops of own sizes at walls", sized(spread(150, 5)),
       {.sizes = Sizes::kOwn, .walls = {{{0, 7, 1, 7}}, {{7, 1, 7, 0}}, {{0, 0, 1, 1}}}});
+  add("body of two phases in a round tank", phased(support::Disc(200)),
+      {.sections = phases, .walls = tank});
   add("drops among wall particles", phased(spread(150, 1.2)), {.wall_phases = {2}});
   add("body among wall particles", phased(support::Disc(200)), {.wall_phases = {2}});
   const ReconstructionParameters grains{

@@ -228,12 +228,6 @@ TEST(PhasesPeriodic, ErrorsNameTheGivenParticleAndTheRule) {
   violation = RefusalOf(PhasesIn(PhaseCell(), 2), scene);
   ASSERT_TRUE(violation.has_value());
   EXPECT_EQ(violation->field, "attributes[phase][9]");
-  ReconstructionParameters parameters = PhasesIn(PhaseChannel(), 2);
-  parameters.walls = {{{0, 0, 1, 0}}};
-  violation = FindViolation(Validate(parameters));
-  ASSERT_TRUE(violation.has_value());
-  EXPECT_EQ(violation->field, "parameters.walls");
-  EXPECT_THAT(violation->rule, testing::HasSubstr("phases"));
 }
 
 }  // namespace

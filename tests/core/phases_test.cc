@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/divided_phases.h"
 #include "partiemc/partiemc.h"
 #include "partiemc/status.h"
 #include "partiemc/validate.h"
@@ -33,91 +34,11 @@ using support::ReconstructOnce;
 using support::RefusalOf;
 using support::RingStream;
 
-// A stream with an outline for each of the phases 1 to `count`.
-ReconstructionParameters WithPhases(int count) {
-  ReconstructionParameters parameters{.spacing = 1.0};
-  for (std::int32_t phase = 1; phase <= count; ++phase) {
-    parameters.sections.push_back({.phase = phase});
-  }
-  return parameters;
-}
-
-// Gives the particles of a frame phases from 1 to `count`: by sectors, stripes, drops or at random.
-void DrawPhases(Random& random, int count, Particles& particles) {
-  const std::size_t kind = random.Below(4);
-  const double width = random.Uniform(1, 12), angle = random.Uniform(0, 7);
-  const double cx = particles.size() > 0 ? particles.x(0) : 0;
-  const double cy = particles.size() > 0 ? particles.y(0) : 0;
-  const double noise = random.Chance(.3) ? random.Uniform(0, 2) : 0;
-  particles.phases.clear();
-  for (std::size_t k = 0; k < particles.size(); ++k) {
-    const double shift_x = random.Uniform(-noise, noise), shift_y = random.Uniform(-noise, noise);
-    const double x = particles.x(k) - cx + shift_x, y = particles.y(k) - cy + shift_y;
-    double place = 0;
-    if (kind == 0) {
-      place = (std::atan2(y, x) + angle) * count / 6.3;
-    } else if (kind == 1) {
-      place = (x * std::cos(angle) + y * std::sin(angle)) / width;
-    } else if (kind == 2) {
-      place = std::floor(x / width) + std::floor(y / width);
-    } else {
-      place = static_cast<double>(random.Below(1'000));
-    }
-    const auto cell = static_cast<std::int64_t>(std::floor(place));
-    particles.phases.push_back(static_cast<float>(1 + ((cell % count) + count) % count));
-  }
-}
-
 Particles RandomPhases(std::uint64_t seed, int count) {
   Random random(seed);
   Particles particles = support::RandomScene(seed);
   DrawPhases(random, count, particles);
   return particles;
-}
-
-using Vertex = std::pair<double, double>;
-
-// The segments of rings, from point to point.
-std::multiset<std::pair<Vertex, Vertex>> SegmentsOf(const Rings& rings) {
-  std::multiset<std::pair<Vertex, Vertex>> segments;
-  for (std::size_t ring = 0; ring < rings.RingCount(); ++ring) {
-    const auto points = rings.RingPoints(ring);
-    const std::size_t count = points.size() / 2;
-    for (std::size_t k = 0; k < count; ++k) {
-      const std::size_t next = (k + 1) % count;
-      segments.insert(
-          {{points[2 * k], points[2 * k + 1]}, {points[2 * next], points[2 * next + 1]}});
-    }
-  }
-  return segments;
-}
-
-// Checks that the outlines of all phases divide the outline of the body: each is valid, their areas
-// sum up to its area, and every segment belongs to the body or, reversed, to another phase.
-void ExpectDivided(const Result& result, Fill fill) {
-  const absl::Status body = Validate(result, fill);
-  EXPECT_TRUE(body.ok()) << body;
-  double area = 0;
-  std::multiset<std::pair<Vertex, Vertex>> inner;
-  std::size_t segments = 0;
-  const auto of_body = SegmentsOf(result.rings);
-  for (const Result& phase : result.sections) {
-    const absl::Status status = Validate(phase, fill);
-    EXPECT_TRUE(status.ok()) << status;
-    area += phase.statistics.area;
-    for (const auto& segment : SegmentsOf(phase.rings)) {
-      if (of_body.contains(segment)) {
-        ++segments;
-      } else {
-        inner.insert(segment);
-      }
-    }
-  }
-  EXPECT_NEAR(area, result.statistics.area, 1e-9 * std::max(1.0, std::abs(area)));
-  EXPECT_EQ(segments, of_body.size());
-  for (const auto& [from, to] : inner) {
-    EXPECT_EQ(inner.count({to, from}), 1u) << from.first << ", " << from.second;
-  }
 }
 
 TEST(Phases, DivideTheBodyInRandomFrames) {
@@ -253,7 +174,7 @@ TEST(Phases, OnePhaseHasTheOutlineOfTheBody) {
     const Particles particles = RandomPhases(seed, 1);
     const ReconstructionParameters parameters = WithPhases(1);
     const Result result = ReconstructOnce(parameters, particles);
-    EXPECT_EQ(SegmentsOf(result.sections[0].rings), SegmentsOf(result.rings));
+    EXPECT_EQ(FaceSegmentsOf(result.sections[0].rings).free, FaceSegmentsOf(result.rings).free);
     ReconstructionParameters alone = parameters;
     alone.sections.clear();
     EXPECT_EQ(DigestRings(ReconstructOnce(alone, particles).rings), DigestRings(result.rings));

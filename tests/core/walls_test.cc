@@ -438,8 +438,10 @@ TEST(Walls, BrokenRulesAreNamed) {
   of.isovalue = .5;
   cases.push_back({of, "walls", "isovalue"});
   of = with(floor);
-  of.sections = {{.phase = 1}};
+  of.sections = {{.phase = 1}, {.isovalue = .5}};
   cases.push_back({of, "walls", "sections"});
+  of = {.spacing = 1.0, .sections = {{.phase = 2}}, .wall_phases = {1, 2}};
+  cases.push_back({of, "wall_phases[1]", "differ from sections[0].phase"});
   of = with(floor);
   of.slice = SlicePlane{};
   cases.push_back({of, "walls", "slice"});

@@ -225,7 +225,7 @@ ReconstructionParameters HostileParameters(Choices& choices) {
       parameters.sections.push_back({.phase = phase});
     }
   }
-  if (may_have_walls && parameters.sections.empty() && choices.Below(2) == 1) {
+  if (may_have_walls && choices.Below(2) == 1) {
     const std::size_t count = 1 + choices.Below(3);
     for (std::size_t k = 0; k < count; ++k) {
       Wall wall = HostileWall(choices, parameters.spacing.value_or(1));
@@ -233,8 +233,7 @@ ReconstructionParameters HostileParameters(Choices& choices) {
       parameters.walls.push_back(std::move(wall));
     }
   }
-  if (may_have_walls && parameters.sections.empty() && !parameters.noise_filter &&
-      choices.Below(2) == 1) {
+  if (may_have_walls && !parameters.noise_filter && choices.Below(2) == 1) {
     for (std::int32_t phase = static_cast<std::int32_t>(choices.Below(3)); phase >= 0; --phase) {
       parameters.wall_phases.push_back(phase);
     }

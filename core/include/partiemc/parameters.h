@@ -92,7 +92,7 @@ struct Section {
   /// 2^24 in magnitude. Sections with phases divide the outline of the stream: two phases share the
   /// points of their interface. All other particles are one more phase, without a result. No two
   /// sections have the same phase. Requires Placement::kVirtualPlane; excludes surfaces, slices,
-  /// Boundary::kGrains, walls, and isovalues of this section or of the stream.
+  /// Boundary::kGrains, and isovalues of this section or of the stream.
   std::optional<std::int32_t> phase = std::nullopt;
 
   friend bool operator==(const Section&, const Section&) = default;
@@ -296,7 +296,8 @@ struct ReconstructionParameters {
   /// lies on the fluid side of every wall. An outline nearer than half a local size to a wall runs
   /// along the wall. Obstacles narrower than a cell may be missed. In a box, endless lines are
   /// parallel to the periodic axis, and polygons are obstacles, which have periodic images.
-  /// Requires Placement::kVirtualPlane; excludes surfaces, slices, isovalues, sections and grains.
+  /// Requires Placement::kVirtualPlane; excludes surfaces, slices, isovalues, grains and
+  /// sections that are no phases.
   std::vector<Wall> walls = {};
 
   static constexpr std::size_t kMaxWallPhases = 16;

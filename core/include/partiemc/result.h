@@ -52,10 +52,10 @@ struct Rings {
   /// (ReconstructionParameters::walls, wall_phases). Where rings crossed, their repair may have
   /// moved an end of this segment off the wall.
   std::vector<std::uint32_t> wetted;
-  /// Indices of points, ascending, where the outline of a body meets a wall, or where a phase meets
-  /// two other phases, or one and the outside (core/PHASES.md). Junctions of phases whose angle
-  /// cannot be measured are not listed. `contact_angles` has one angle per contact, of the fluid or
-  /// of the phase, in radians, in [0, 2 pi].
+  /// Indices of points, ascending, where an outline meets a wall, or where a phase meets two other
+  /// phases, or one and the outside (core/PHASES.md). Junctions of phases whose angle cannot be
+  /// measured are not listed. `contact_angles` has one angle per contact, of the fluid or of the
+  /// phase, in radians, in [0, 2 pi].
   std::vector<std::uint32_t> contacts;
   std::vector<float> contact_angles;
 

@@ -1,5 +1,6 @@
 #include "frame/wall_rules.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -103,7 +104,10 @@ absl::Status CheckOthers(const ReconstructionParameters& p, const std::string& f
   }
   if (p.slice) return refused("must be absent with a slice");
   if (p.isovalue) return refused("must be absent with an isovalue");
-  if (!p.sections.empty()) return refused("must be absent with sections: slices, isolines, phases");
+  const auto is_phase = [](const Section& section) { return section.phase.has_value(); };
+  if (!std::ranges::all_of(p.sections, is_phase)) {
+    return refused("must be absent with sections that are no phases: slices, isolines");
+  }
   if (p.boundary == Boundary::kGrains) return refused("must be absent if the boundary is grains");
   if (p.placement != Placement::kVirtualPlane) {
     return refused("must be absent unless the placement is virtual-plane");
@@ -129,6 +133,11 @@ absl::Status CheckWallPhases(const ReconstructionParameters& p) {
       if (phases[other] != phases[k]) continue;
       return Refused(field, absl::StrCat(phases[k]),
                      absl::StrCat("must differ from wall_phases[", other, "]"));
+    }
+    for (std::size_t section = 0; section < p.sections.size(); ++section) {
+      if (p.sections[section].phase != phases[k]) continue;
+      return Refused(field, absl::StrCat(phases[k]),
+                     absl::StrCat("must differ from sections[", section, "].phase"));
     }
   }
   return CheckPhaseAttribute(p.phase_attribute, "particles of some phases are walls");

@@ -35,7 +35,7 @@ bool Follows(const ArcCurve& curve, const RingPath& path, const Point& vertex, d
 }  // namespace
 
 RingPath::RingPath(const Rings& body, std::uint32_t vertex, bool is_ahead, double spacing,
-                   std::span<const std::uint8_t> is_contact, std::span<const Point> positions)
+                   std::span<const std::uint8_t> ends_path, std::span<const Point> positions)
     : vertex_(vertex), is_ahead_(is_ahead) {
   const auto after = std::ranges::upper_bound(body.offsets, vertex);
   begin_ = *(after - 1);
@@ -44,7 +44,7 @@ RingPath::RingPath(const Rings& body, std::uint32_t vertex, bool is_ahead, doubl
   double distance = 0;
   for (; size_ + 1 < count_ && distance <= kCurvatureFarthest; ++size_) {
     const std::uint32_t next = (*this)[size_];
-    if (is_contact[next] != 0) return;
+    if (ends_path[next] != 0) return;
     distance += Length(Minus(positions[next], last)) / spacing;
     last = positions[next];
   }
@@ -87,14 +87,17 @@ double RingAreas::AreaOf(const Rings& body, std::uint32_t ring, const PhaseImage
   return twice / 2;
 }
 
-double RingAreas::LengthOf(const Rings& body, std::uint32_t ring, const PhaseImages& images,
-                           std::span<const Point> positions) const {
+double RingAreas::LengthOf(const Rings& body, std::uint32_t ring, const WallVertices* walls,
+                           const PhaseImages& images, std::span<const Point> positions) const {
   const std::uint32_t begin = body.offsets[ring], end = body.offsets[ring + 1];
   const bool is_cut = images.IsRingCut(ring);
   double length = 0;
   for (std::uint32_t k = begin; k < end; ++k) {
-    const Point &from = positions[k], &to = positions[k + 1 == end ? begin : k + 1];
-    length += is_cut ? LengthInWindow(from, to, images.window()) : Length(Minus(to, from));
+    const std::uint32_t next = k + 1 == end ? begin : k + 1;
+    const Point &from = positions[k], &to = positions[next];
+    const double share = (IsOnWall(walls, k) + IsOnWall(walls, next)) / 2.0;
+    length += (1 - share) *
+              (is_cut ? LengthInWindow(from, to, images.window()) : Length(Minus(to, from)));
   }
   return length;
 }
@@ -107,8 +110,8 @@ void RingAreas::Measure(const Rings& body, const PhaseImages& images,
   }
 }
 
-void RingAreas::Restore(const Rings& body, const PhaseImages& images, double limit,
-                        std::span<std::uint8_t> has_moved, SharedPoints& points) {
+void RingAreas::Restore(const Rings& body, const WallVertices* walls, const PhaseImages& images,
+                        double limit, std::span<std::uint8_t> has_moved, SharedPoints& points) {
   const auto moved_of = [&](std::uint32_t ring) {
     return has_moved.subspan(body.offsets[ring], body.offsets[ring + 1] - body.offsets[ring]);
   };
@@ -125,13 +128,14 @@ void RingAreas::Restore(const Rings& body, const PhaseImages& images, double lim
     Group& group = groups_[images.GroupOf(ring)];
     if (!group.has_corner) continue;
     group.now += AreaOf(body, ring, images, points.position);
-    group.length += LengthOf(body, ring, images, points.position);
+    group.length += LengthOf(body, ring, walls, images, points.position);
   }
   for (std::uint32_t ring = 0; ring < body.RingCount(); ++ring) {
     const Group& group = groups_[images.GroupOf(ring)];
     if (!group.has_corner || !(group.length > 0)) continue;
     const double offset = std::clamp((group.before - group.now) / group.length, -limit, limit);
     for (std::uint32_t k = body.offsets[ring]; k < body.offsets[ring + 1]; ++k) {
+      if (IsOnWall(walls, k)) continue;
       const VertexNormal& normal = points.normal[k];
       points.position[k] =
           Plus(points.position[k], Times({double{normal.x}, double{normal.y}}, offset));

@@ -12,6 +12,7 @@
 #include "phases/arc_curve.h"
 #include "phases/interfaces.h"
 #include "phases/phase_images.h"
+#include "vertices/wall_vertices.h"
 
 namespace partiemc {
 
@@ -20,13 +21,13 @@ namespace partiemc {
 inline constexpr std::uint8_t kMoved = 1, kMovedCorner = 2;
 
 /// The vertices of a ring of the body after a vertex (`is_ahead`) or before it, nearest first. The
-/// path ends at kCurvatureFarthest spacings along the ring, or before the next contact, which is a
-/// vertex where interfaces end.
+/// path ends at kCurvatureFarthest spacings along the ring, or before the next vertex where
+/// interfaces end or that lies on a wall.
 class RingPath {
  public:
-  /// Lengths are in cells. `is_contact`: by vertex, whether interfaces end there.
+  /// Lengths are in cells. `ends_path`: by vertex, whether the path ends before it.
   RingPath(const Rings& body, std::uint32_t vertex, bool is_ahead, double spacing,
-           std::span<const std::uint8_t> is_contact, std::span<const Point> positions);
+           std::span<const std::uint8_t> ends_path, std::span<const Point> positions);
   std::size_t size() const { return size_; }
   std::uint32_t operator[](std::size_t k) const;
 
@@ -55,11 +56,11 @@ class RingAreas {
   void Measure(const Rings& body, const PhaseImages& images, std::span<const Point> positions);
 
   /// For each ring with a corner: moves all its vertices along their normals by one offset, at most
-  /// `limit` cells in both directions. The offset restores the area, to first order. `has_moved`:
-  /// by vertex, kMovedCorner at corners; sets the elements of such a ring that are 0 to kMoved.
-  /// Requires: Measure.
-  void Restore(const Rings& body, const PhaseImages& images, double limit,
-               std::span<std::uint8_t> has_moved, SharedPoints& points);
+  /// `limit` cells in both directions. The offset restores the area, to first order. Vertices on
+  /// walls stay. `walls`: by vertex; null without walls. `has_moved`: by vertex, kMovedCorner at
+  /// corners; sets the elements of vertices that move and are 0 to kMoved. Requires: Measure.
+  void Restore(const Rings& body, const WallVertices* walls, const PhaseImages& images,
+               double limit, std::span<std::uint8_t> has_moved, SharedPoints& points);
 
  private:
   // Sums over a group of rings (PhaseImages::GroupOf).
@@ -70,8 +71,10 @@ class RingAreas {
 
   double AreaOf(const Rings& body, std::uint32_t ring, const PhaseImages& images,
                 std::span<const Point> positions);
-  double LengthOf(const Rings& body, std::uint32_t ring, const PhaseImages& images,
-                  std::span<const Point> positions) const;
+  // The length of the segments that move: those off the walls, and half of those with one end on a
+  // wall.
+  double LengthOf(const Rings& body, std::uint32_t ring, const WallVertices* walls,
+                  const PhaseImages& images, std::span<const Point> positions) const;
 
   std::vector<Group> groups_;  // By ring; only the first ring of a group has its sums.
   std::vector<double> ring_;   // Points of a ring, interleaved.

@@ -14,6 +14,10 @@ constexpr int kFewestPoints = 4;
 // As kPlaceNoise, for directions.
 constexpr double kDirectionNoise = 20;
 
+bool LiesOnWall(const PhaseRing& ring, std::uint32_t point) {
+  return ring.walls != nullptr && point < ring.walls->kind.size() && IsOnWall(ring.walls, point);
+}
+
 /// The direction in which a side of the ring leaves the junction at point `k`; absent if the side
 /// is too short. `step`: 1 for the side after the junction, -1 for the side before it. Inside of
 /// the body, the junction is one of the fitted points. On the outline of the body it is not,
@@ -31,6 +35,10 @@ std::optional<Point> DirectionFrom(const PhaseRing& ring, std::size_t k, int ste
     const Point x = Minus(PointAt(ring.world, ring.points[at]), junction);
     s += Length(Minus(x, last)) / h;
     last = x;
+    if (LiesOnWall(ring, ring.points[at])) {
+      if (n == 1 && LiesOnWall(ring, ring.points[k])) return x;
+      break;
+    }
     if (s > kCurvatureFarthest || ring.is_junction[ring.points[at]] != 0) break;
     fit.Add(x, s);
     points += s >= kCurveNearest;

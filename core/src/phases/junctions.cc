@@ -29,6 +29,8 @@ constexpr double kLongestMove = 1.5;
 constexpr double kShare = .9, kSharedShare = .45;
 // A line that meets the ring at a smaller angle, given by its sine, does not determine a place.
 constexpr double kSmallestSine = .3;
+// The sine of the largest turn of a wall at a vertex that may move along it.
+constexpr double kStraightWall = .02;
 // The anchors of images differ by whole lengths up to this error, in cells. The anchors of contacts
 // are computed with single precision.
 constexpr double kImageError = 1e-3;
@@ -88,6 +90,17 @@ Point Limited(const Point& move, double most) {
   return length > most ? Times(move, most / length) : move;
 }
 
+// Whether a vertex of the body may move towards its neighbours. A vertex on a wall must have the
+// same straight wall on both sides, so that it stays on the wall and keeps the corners of the wall.
+bool MayMove(std::uint32_t previous, std::uint32_t vertex, std::uint32_t next,
+             const WallVertices* walls, std::span<const Point> positions) {
+  if (!IsOnWall(walls, vertex)) return true;
+  if (walls->is_wet[previous] == 0 || walls->is_wet[vertex] == 0) return false;
+  const Point before = Between(positions[previous], positions[vertex]);
+  const Point after = Between(positions[vertex], positions[next]);
+  return std::abs(Cross(before, after)) <= kStraightWall * Dot(before, after);
+}
+
 // Where lines meet the ring of a vertex of the body, between the neighbours of the vertex.
 Point PlaceOnRing(std::span<const Line> lines, std::uint32_t vertex, const Rings& body,
                   const JunctionScratch& scratch, const SharedPoints& points) {
@@ -96,6 +109,7 @@ Point PlaceOnRing(std::span<const Line> lines, std::uint32_t vertex, const Rings
   const std::uint32_t next = vertex + 1 == end ? begin : vertex + 1;
   const std::uint32_t previous = vertex == begin ? end - 1 : vertex - 1;
   const Point& at = points.position[vertex];
+  if (!MayMove(previous, vertex, next, scratch.walls, points.position)) return at;
   // The outward normal lies on the right of the ring.
   const Point along{-points.normal[vertex].y, points.normal[vertex].x};
   double sum = 0, count = 0;
@@ -162,7 +176,7 @@ JunctionPlan PlanOf(std::span<const ArcEnd> ends, const Rings& body, double h,
   const std::uint32_t junction = ends[0].junction;
   const Point& before = points.position[junction];
   const auto side = [&](bool is_ahead) {
-    return RingPath(body, junction, is_ahead, h, scratch.is_contact, points.position);
+    return RingPath(body, junction, is_ahead, h, scratch.ends_path, points.position);
   };
   JunctionPlan plan{.ends = ends};
   const bool is_body = junction < body.PointCount();
@@ -281,12 +295,18 @@ void CollectEnds(const Interfaces& interfaces, std::size_t body_points, Junction
   for (const auto& end : scratch.ends) {
     if (end.junction < body_points) scratch.is_contact[end.junction] = 1;
   }
+  scratch.ends_path = scratch.is_contact;
+  for (std::size_t k = 0; scratch.walls != nullptr && k < body_points; ++k) {
+    if (IsOnWall(scratch.walls, k)) scratch.ends_path[k] = 1;
+  }
 }
 
 }  // namespace
 
-void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,
-                   const PhaseImages& images, JunctionScratch& scratch, SharedPoints& points) {
+void MoveJunctions(const Scale& scale, const Rings& body, const WallVertices* walls,
+                   const Interfaces& interfaces, const PhaseImages& images,
+                   JunctionScratch& scratch, SharedPoints& points) {
+  scratch.walls = walls;
   CollectEnds(interfaces, body.PointCount(), scratch);
   const double h = scale.spacing;
   scratch.plans.clear();

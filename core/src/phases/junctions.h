@@ -15,6 +15,7 @@
 #include "phases/body_corner.h"
 #include "phases/interfaces.h"
 #include "phases/phase_images.h"
+#include "vertices/wall_vertices.h"
 
 namespace partiemc {
 
@@ -58,10 +59,12 @@ struct JunctionImage {
 
 /// Scratch of MoveJunctions.
 struct JunctionScratch {
+  const WallVertices* walls = nullptr;
   std::vector<ArcEnd> ends;              // By junction, then by the phases on both sides.
   std::vector<JunctionPlan> plans;       // By junction.
   std::vector<JunctionImage> images;     // By cell, nearest to the middle of the box first.
   std::vector<std::uint8_t> is_contact;  // By point of the body: whether interfaces end there.
+  std::vector<std::uint8_t> ends_path;   // By point of the body: RingPath ends before it.
   std::vector<std::uint8_t> has_moved;   // By point of the body: 0, kMoved or kMovedCorner.
 };
 
@@ -70,17 +73,19 @@ struct JunctionScratch {
 /// 9 spacings away (arc_curve.h). Nearer points of an arc go onto a parabola to the new place.
 /// - A junction inside of the body with fewer than two curves stays, as does a junction on the
 ///   outline of the body without any curve.
-/// - A junction that is a vertex of the body moves along its ring, not beyond the next vertices.
+/// - A junction that is a vertex of the body moves along its ring, not beyond the next vertices. On
+///   a wall it moves along a straight part of the wall only.
 /// - If the body has a corner there (body_corner.h), the curves of both sides of the ring count,
 ///   too. The junction may then move in any direction. The vertices of the ring up to about 1.5
 ///   spacings away follow, with turned normals.
 /// All moves are planned before any junction moves, so their order does not matter. In a periodic
 /// box whose lengths are whole numbers of cells, the images of a junction move as the image nearest
 /// to the middle of the box. Far from the box, copies are missing, and curves may differ.
-/// Sets has_moved of the body's points that move. Requires: has_moved has an element for each point
-/// of the body; PhaseImages::Build. Cost: linear in the points near junctions, and n log n for n
-/// junctions.
-void MoveJunctions(const Scale& scale, const Rings& body, const Interfaces& interfaces,
-                   const PhaseImages& images, JunctionScratch& scratch, SharedPoints& points);
+/// Sets has_moved of the body's points that move. `walls`: by point of the body; null without
+/// walls. Requires: has_moved has an element for each point of the body; PhaseImages::Build. Cost:
+/// linear in the points near junctions, and n log n for n junctions.
+void MoveJunctions(const Scale& scale, const Rings& body, const WallVertices* walls,
+                   const Interfaces& interfaces, const PhaseImages& images,
+                   JunctionScratch& scratch, SharedPoints& points);
 
 }  // namespace partiemc

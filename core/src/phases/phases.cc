@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
@@ -75,6 +76,29 @@ VertexNormal ChordNormal(std::span<const double> world, std::span<const std::uin
   return {static_cast<float>(x / length), static_cast<float>(y / length)};
 }
 
+// Whether a ring of a phase runs along a wall from point k to the next one.
+bool IsWet(const Phases& p, std::span<const std::uint32_t> ring, std::size_t k) {
+  if (p.walls == nullptr || !p.numbers.IsBody(ring[k]) || p.walls->is_wet[ring[k]] == 0) {
+    return false;
+  }
+  const std::uint32_t next = ring[k + 1 == ring.size() ? 0 : k + 1];
+  return p.numbers.IsBody(next) && p.walls->kind[next] != VertexKind::kFree;
+}
+
+// The angle of a phase at point k of its ring, if interfaces end there or the outline of the body
+// meets a wall. `spacing`: world units.
+std::optional<float> AngleOf(const Phases& p, std::span<const std::uint32_t> ring, std::size_t k,
+                             double spacing) {
+  const std::uint32_t point = ring[k];
+  const bool is_body = p.numbers.IsBody(point);
+  if (p.is_junction[point] != 0) {
+    return JunctionAngle({ring, p.world, p.is_junction, p.walls}, k, !is_body, spacing);
+  }
+  const bool is_contact =
+      is_body && p.walls != nullptr && p.walls->kind[point] == VertexKind::kContact;
+  return is_contact ? std::optional(p.walls->angle[point]) : std::nullopt;
+}
+
 }  // namespace
 
 std::uint64_t CountPhases(const ReconstructionParameters& parameters) {
@@ -109,7 +133,7 @@ void MapPhases(const PhaseInput& input, Phases& p) {
 
 bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& p, Rings& body) {
   const TileDirectory& directory = input.bins.tiles;
-  const BodyOutline outline{input.crossings, input.topology, placed, input.vertices};
+  const BodyOutline outline{input.crossings, input.topology, placed, input.vertices.vertices};
   p.vertices.Build(outline);
   p.numbers.edges = static_cast<std::uint32_t>(body.PointCount());
   p.numbers.cells = p.numbers.edges + static_cast<std::uint32_t>(p.map.edges.size());
@@ -120,15 +144,16 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   }
   TakeBody(placed, body, input.scale.cell_size, p.points);
   p.junctions.has_moved.assign(body.PointCount(), 0);
+  p.walls = input.vertices.WallPoints();
   FindInterfacePoints(directory, p.map, p.field, p.numbers, p.vertices, p.points);
   CollectArcs(directory, p.map, p.numbers, p.rings, p.interfaces);
   SmoothInterfaces(input.scale, input.variant.constants, p.interfaces, p.points);
   p.images.Build(input.percolation, outline, input.scale.cell_size, p.rings);
   p.ring_areas.Measure(body, p.images, p.points.position);
   const auto move_junctions = [&] {
-    MoveJunctions(input.scale, body, p.interfaces, p.images, p.junctions, p.points);
-    p.ring_areas.Restore(body, p.images, kCornerLimit * input.scale.spacing, p.junctions.has_moved,
-                         p.points);
+    MoveJunctions(input.scale, body, p.walls, p.interfaces, p.images, p.junctions, p.points);
+    p.ring_areas.Restore(body, p.walls, p.images, kCornerLimit * input.scale.spacing,
+                         p.junctions.has_moved, p.points);
   };
   move_junctions();
   SumRegions({input.bins, input.scale, p.field, p.map, p.labels, input.originals, p.rings},
@@ -181,12 +206,11 @@ void WritePhaseRings(const Phases& p, const Scale& scale, PhaseLabel label, Plac
         normal = {sign * p.points.normal[point].x, sign * p.points.normal[point].y};
       }
       rings.normals.insert(rings.normals.end(), {normal.x, normal.y});
-      if (p.is_junction[point] == 0) continue;
-      const auto angle =
-          JunctionAngle({points, p.world, p.is_junction}, k, !p.numbers.IsBody(points[k]),
-                        scale.spacing * scale.cell_size);
+      const auto number = phase.offsets[ring] + static_cast<std::uint32_t>(k);
+      if (IsWet(p, points, k)) rings.wetted.push_back(number);
+      const auto angle = AngleOf(p, points, k, scale.spacing * scale.cell_size);
       if (!angle) continue;
-      rings.contacts.push_back(phase.offsets[ring] + static_cast<std::uint32_t>(k));
+      rings.contacts.push_back(number);
       rings.contact_angles.push_back(*angle);
     }
   }

@@ -40,6 +40,7 @@ struct Phases {
   PhaseTraceScratch trace;
   JunctionScratch junctions;
   std::vector<std::uint8_t> is_junction;  ///< By shared point: whether interfaces end there.
+  const WallVertices* walls = nullptr;    ///< VertexScratch::WallPoints of the body.
   PhaseAreaScratch areas;
   PhaseRepairScratch repair;
 };
@@ -53,7 +54,7 @@ struct PhaseInput {
   const ParticleBins& bins;
   const Crossings& crossings;
   const RingTopology& topology;
-  const RingVertices& vertices;
+  const VertexScratch& vertices;
   const Percolation* percolation = nullptr;       ///< Null without copies of particles.
   std::span<const std::uint32_t> originals = {};  ///< By copy: its particle.
 };
@@ -93,7 +94,8 @@ inline std::uint64_t InterfacePointsOf(const Phases& phases) {
                                Phases& phases, Rings& body);
 
 /// Writes the rings of a phase, in world units, without identities, and their placement for the
-/// stages identities and mesh. Junctions with an angle become contacts of the rings.
+/// stages identities and mesh. Junctions with an angle, and the contacts of the body with walls,
+/// become contacts of the rings.
 void WritePhaseRings(const Phases& phases, const Scale& scale, PhaseLabel label,
                      PlacedVertices& placed, Rings& rings);
 

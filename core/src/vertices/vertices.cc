@@ -136,7 +136,7 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   rings.points.resize(2 * std::size_t{count});
   rings.normals.resize(2 * std::size_t{count});
   placed.roots.resize(2 * std::size_t{count});
-  const bool has_walls =
+  const bool has_walls = scratch.meets_walls =
       input.walls != nullptr &&
       std::ranges::any_of(vertices.meets_wall, [](std::uint8_t meets) { return meets != 0; });
   scratch.sizes.resize(input.scale.has_own_sizes ? count : 0);
@@ -213,6 +213,7 @@ bool PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
   const RingTopology& topology = input.topology;
   rings.Clear();
   placed.self_intersections = 0;
+  scratch.meets_walls = false;
   placed.group_of_ring.clear();
   placed.point_of_segment.resize(topology.segments.size());
   placed.kept_as.resize(topology.RingCount());

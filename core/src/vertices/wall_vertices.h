@@ -45,6 +45,11 @@ struct WallVertices {
   }
 };
 
+/// Whether a vertex or point lies on a wall. `walls`: null without walls.
+inline bool IsOnWall(const WallVertices* walls, std::size_t vertex) {
+  return walls != nullptr && walls->kind[vertex] != VertexKind::kFree;
+}
+
 /// Sets `vertices.walls` for the vertices of a ring. Moves vertices on walls to their places: an
 /// edge vertex to where its edge meets the wall, a cell vertex to the sharpest corner of the walls
 /// in its cell. Without a corner, and for a contact, the place is the one nearest to the middle of

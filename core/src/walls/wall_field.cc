@@ -90,7 +90,7 @@ struct Surrounded {
   int i, j;     // The node left of the point and below it, relative to the tile.
   double u, v;  // The point relative to this node.
 
-  // Of a point of a tile and its neighbours.
+  // Takes a point of a tile, or of a tile beside it.
   Surrounded(const TileDirectory& directory, std::uint32_t tile, const Point& point) {
     const Point origin = OriginOf(directory, tile);
     const double x = std::clamp<double>(point.x - origin.x, -kTileSize, 2 * kTileSize - 1.001);

@@ -25,9 +25,9 @@ namespace partiemc {
 /// A frame calls ListLines, FindTiles and Apply, in this order.
 class WallField {
  public:
-  /// Fluid nearer to a wall than this touches it. In local sizes, which are 1 spacing unless
-  /// particles have own sizes: the outline lies about half a size outside of the outermost
-  /// particles, so a gap of this height holds no layer of particles.
+  /// Fluid nearer to a wall than this many local sizes touches it. For equal sizes, the local size
+  /// is the spacing. The outline lies about half a size outside of the outermost particles, so a
+  /// gap of this height holds no layer of particles.
   static constexpr double kReach = .5;
   /// In cells. Larger heights are not measured.
   static constexpr float kMostHeight = 4;

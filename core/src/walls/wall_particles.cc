@@ -55,7 +55,8 @@ absl::Status WallParticles::Take(const Frame& frame, const ReconstructionParamet
     (is_wall ? walls_ : fluid_).sources.push_back(static_cast<std::uint32_t>(k));
   }
   Frame others = frame;
-  others.attributes = attributes_;
+  // The phases divide the fluid, too.
+  if (parameters.sections.empty()) others.attributes = attributes_;
   fluid_.Take(others);
   others.attributes = {};
   others.ids = {};

@@ -23,7 +23,8 @@ class WallParticles {
   /// An upper bound of the memory for a frame.
   static std::uint64_t BytesFor(const Frame& frame);
 
-  /// Views of this object. Neither has the attribute of the phases.
+  /// Views of this object. The fluid has the attribute of the phases if there are sections, the
+  /// walls have no attributes.
   const Frame& fluid() const { return fluid_.frame; }
   /// By particle of the fluid, or of the walls: its number in the given frame.
   std::span<const std::uint32_t> fluid_sources() const { return fluid_.sources; }

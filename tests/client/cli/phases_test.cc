@@ -46,6 +46,41 @@ TEST(PhasesReplay, EachPhaseIsASectionWithItsArea) {
   EXPECT_EQ(digests[0], digests[1]);
 }
 
+// Two fluids of the types 1 and 2 on a floor of particles of the type 3, beside a wall.
+TEST(PhasesReplay, PhasesEndAtWalls) {
+  const support::TemporaryFolder folder;
+  const std::string csv = folder.Path("frame.csv"), stats = folder.Path("s.csv");
+  std::ofstream file(csv);
+  file << "x,y,type\n";
+  for (int i = 0; i < 24; ++i) {
+    for (int j = -2; j < 16; ++j) {
+      file << i + .5 << "," << j + .5 << "," << (j < 0 ? 3 : j < 6 ? 1 : 2) << "\n";
+    }
+  }
+  file.close();
+  std::vector<std::vector<std::string>> digests;
+  ServerProgram server;
+  for (const std::vector<std::string>& where :
+       {std::vector<std::string>{"--local"}, {"--server", server.address()}}) {
+    std::vector<std::string> arguments = {"replay",   csv,      "--spacing", "1",      "--phases",
+                                          "type=1,2", "--wall", "type=3",    "--wall", "0,1,0,0",
+                                          "--stats",  stats,    "--check"};
+    arguments.insert(arguments.end(), where.begin(), where.end());
+    const Ran ran = RunPartiemc(arguments);
+    ASSERT_EQ(ran.exit_code, 0) << ran.error;
+    const auto areas = Column(Content(stats), "area");
+    ASSERT_EQ(areas.size(), 3u);
+    EXPECT_NEAR(std::stod(areas[1]), 24 * 6, 1);
+    EXPECT_NEAR(std::stod(areas[2]), 24 * 10, 1);
+    digests.push_back(Column(Content(stats), "rings_digest"));
+  }
+  EXPECT_EQ(digests[0], digests[1]);
+  const Ran other = RunPartiemc(
+      {"replay", csv, "--spacing", "1", "--phases", "type=1,2", "--wall", "kind=3", "--local"});
+  EXPECT_NE(other.exit_code, 0);
+  EXPECT_THAT(other.error, HasSubstr("that of --phases"));
+}
+
 // A box of 30 x 24 with a drop of type 2 across its corner.
 TEST(PhasesReplay, PhasesAreCutAtThePeriodicBox) {
   const support::TemporaryFolder folder;

@@ -164,7 +164,8 @@ typedef struct partiemc_options {
    * after wall. Wall k has wall_sizes[k] points. Two points: the endless line through them. More
    * points: a closed polygon, a tank if it is counter-clockwise, an obstacle if it is clockwise. At
    * most 1024 points together. In a periodic box, endless lines are parallel to the periodic axis,
-   * and polygons are obstacles. Excludes surfaces, slices, isovalues, grains and phases. */
+   * and polygons are obstacles. Excludes surfaces, slices, isovalues and grains, and sections that
+   * are no phases. */
   const double* walls;
   const uint32_t* wall_sizes;
   size_t wall_count;
@@ -384,8 +385,8 @@ typedef struct partiemc_event {
   /* With `walls` or `wall_phases`: wetted_count points, ascending, whose segment to the next point
    * of the ring lies on a wall; contact_count points, ascending, where an outline meets a wall, and
    * the angle of the fluid at each, between the wall and the outline, in radians. In the outline of
-   * a phase, contacts are the points where the phase meets two other phases, or one other phase and
-   * the outside, and the angles are those of the phase. */
+   * a phase, contacts are the points where the phase meets a wall, two other phases, or one other
+   * phase and the outside, and the angles are those of the phase. */
   size_t wetted_count;
   const uint32_t* wetted;
   size_t contact_count;
