@@ -156,7 +156,9 @@ absl::Status AddWalls(const ReplayFlags& flags, ReconstructionParameters& parame
       if (AttributeOf(text) != known ||
           !ParsePhases(text, parameters.phase_attribute, parameters.wall_phases)) {
         return WrongFlag("--wall", text,
-                         "one attribute, that of --phases, and whole numbers, such as type=2");
+                         flags.phases.empty()
+                             ? "one attribute and whole numbers, such as type=2"
+                             : "the attribute of --phases and whole numbers, such as type=2");
       }
       continue;
     }

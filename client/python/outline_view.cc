@@ -189,7 +189,7 @@ void DefineRings(py::module_& module) {
       .def_property_readonly(
           "contacts", [](R r) { return View<std::uint32_t>(r.part.contacts, 1, r.owner); },
           "(K,) uint32, ascending. Of a body: points where its outline meets a wall. Of a phase: "
-          "points where it meets two other phases, or one and the outside.")
+          "points where it meets a wall, two other phases, or one and the outside.")
       .def_property_readonly(
           "contact_angles", [](R r) { return View<float>(r.part.contact_angles, 1, r.owner); },
           "(K,) float32, radians: the angle of the fluid at each contact, between the wall and the "

@@ -212,8 +212,8 @@ absl::Status FillRings(const FillTask& task, Workspace::Buffers& b, Result& resu
 // RepairPhases fails, which is a bug.
 absl::Status DividePhases(const OutlineTask& task, const Frame& frame, const Scale& scale,
                           FrameMemory& memory, Workspace::Buffers& b, Rings& rings) {
-  PhaseInput input{frame,  task.parameters, task.variant, scale,
-                   b.bins, b.crossings,     b.topology,   b.vertex_scratch};
+  PhaseInput input{frame,       task.parameters, task.variant,     scale,  b.bins,
+                   b.crossings, b.topology,      b.vertex_scratch, b.walls};
   if (b.last.percolation) {
     input.percolation = &*b.last.percolation;
     input.originals = task.prepared->lifted.originals;

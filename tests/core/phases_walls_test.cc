@@ -206,7 +206,7 @@ TEST(PhasesAtWalls, AnyNumberOfThreadsAndAnyInstructionSetGivesTheSameBits) {
 }
 
 TEST(PhasesAtWalls, PhasesDivideTheBodyInRandomFrames) {
-  std::size_t contacts = 0, wetted = 0;
+  std::size_t contacts = 0, wetted = 0, beyond = 0, points = 0;
   for (std::uint64_t seed = 1; seed <= support::Tries(600u) && !HasFailure(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     Random random(seed);
@@ -237,8 +237,21 @@ TEST(PhasesAtWalls, PhasesDivideTheBodyInRandomFrames) {
     ExpectDivided(result, parameters.fill);
     for (const Result& phase : result.sections) contacts += phase.rings.contacts.size();
     wetted += WettedOf(result);
+    // Cuts divide wetted segments.
+    if (!parameters.box) {
+      EXPECT_EQ(WettedOf(result), result.rings.wetted.size());
+    }
+    points += result.rings.PointCount();
+    for (std::size_t k = 0; k < result.rings.PointCount(); ++k) {
+      const double x = result.rings.points[2 * k], y = result.rings.points[2 * k + 1];
+      beyond += std::ranges::any_of(parameters.walls, [&](const Wall& wall) {
+        return support::HeightAbove(wall, x, y) < -1e-6;
+      });
+    }
   }
-  std::printf("%zu contacts, %zu wetted\n", contacts, wetted);
+  std::printf("%zu contacts, %zu wetted, %zu of %zu points beyond a wall\n", contacts, wetted,
+              beyond, points);
+  EXPECT_LT(beyond, points / 1'000);
   EXPECT_GT(contacts, support::Tries(600u));
   EXPECT_GT(wetted, support::Tries(600u));
 }

@@ -61,8 +61,8 @@ def reconstruct(positions, *, volumes=None, ids=None, velocities=None, attribute
         slice, isovalue or both, or of a phase. Other parameters are the same for all outlines:
         [{"isovalue": 0.3}, {"slice": ("z", 0.7)}]. Phases divide the outline and share their
         interfaces: [{"phase": 1}, {"phase": 2}]; they need the attribute "phase", a whole number
-        for each particle. `rings.contacts` of a phase are the points where it meets two others, or
-        one and the outside; `rings.contact_angles` are its angles there, in radians.
+        for each particle. `rings.contacts` of a phase are the points where it meets a wall, two
+        others, or one and the outside; `rings.contact_angles` are its angles there, in radians.
     phase_attribute: the name of that attribute, such as "type".
     attribute_tolerance: largest error of attributes across triangles of fill "greedy", as a fraction
         of the attribute's range, in [0, 1]. Default 0.01; 1 makes the fewest triangles.

@@ -302,10 +302,10 @@ struct ReconstructionParameters {
 
   static constexpr std::size_t kMaxWallPhases = 16;
 
-  /// The phases (`phase_attribute`) of wall particles, at most 16, distinct. The outline of these
-  /// particles is a further wall in each frame, half a spacing outside of their outermost layers.
-  /// Walls need two layers or more. Requires and excludes the same as `walls`; excludes
-  /// `noise_filter`, too.
+  /// The phases (`phase_attribute`) of wall particles, at most 16, distinct, and none of a section.
+  /// The outline of these particles is a further wall in each frame, half a size outside of their
+  /// outermost layers. Walls need two layers or more. Requires and excludes the same as `walls`;
+  /// excludes `noise_filter`, too.
   std::vector<std::int32_t> wall_phases = {};
 
   static constexpr std::size_t kMaxWallPlanes = 6;

@@ -186,7 +186,7 @@ absl::Status CheckBox(const ReconstructionParameters& p) {
   return absl::OkStatus();
 }
 
-// Checks that no other parameter excludes own sizes. CheckWalls does so for walls.
+// Checks that no other parameter excludes own sizes.
 absl::Status CheckSizes(const ReconstructionParameters& p) {
   if (p.sizes == Sizes::kEqual) return absl::OkStatus();
   const auto refused = [&](const std::string& with) {

@@ -8,6 +8,7 @@
 #include "core/internal/research.h"
 #include "frame/frame_view.h"
 #include "phases/junction_angles.h"
+#include "vertices/contacts.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
 
@@ -76,13 +77,34 @@ VertexNormal ChordNormal(std::span<const double> world, std::span<const std::uin
   return {static_cast<float>(x / length), static_cast<float>(y / length)};
 }
 
+void FindWetted(const Rings& body, Phases& p) {
+  p.wet_next.clear();
+  if (p.walls == nullptr) return;
+  p.wet_next.assign(body.PointCount(), PhaseArc::kNoEnd);
+  for (std::size_t ring = 0; ring < body.RingCount(); ++ring) {
+    const std::uint32_t begin = body.offsets[ring], end = body.offsets[ring + 1];
+    for (std::uint32_t k = begin; k < end; ++k) {
+      if (p.walls->is_wet[k] != 0) p.wet_next[k] = k + 1 == end ? begin : k + 1;
+    }
+  }
+}
+
 // Whether a ring of a phase runs along a wall from point k to the next one.
 bool IsWet(const Phases& p, std::span<const std::uint32_t> ring, std::size_t k) {
-  if (p.walls == nullptr || !p.numbers.IsBody(ring[k]) || p.walls->is_wet[ring[k]] == 0) {
-    return false;
-  }
   const std::uint32_t next = ring[k + 1 == ring.size() ? 0 : k + 1];
-  return p.numbers.IsBody(next) && p.walls->kind[next] != VertexKind::kFree;
+  return ring[k] < p.wet_next.size() && p.wet_next[ring[k]] == next;
+}
+
+// Junctions and RingAreas may have moved free points of the body into walls.
+void KeepBodyOffWalls(const PhaseInput& input, Phases& p) {
+  for (std::size_t k = 0; p.walls != nullptr && k < p.junctions.has_moved.size(); ++k) {
+    const std::uint32_t tile = p.walls->tile[k];
+    if (p.junctions.has_moved[k] == 0 || IsOnWall(p.walls, k) || tile == kNoTile) continue;
+    const std::vector<float>& sizes = input.vertices.sizes;
+    const double size = sizes.empty() ? 1.0 : double{sizes[k]};
+    Point& at = p.points.position[k];
+    at = KeepOffWalls(input.walls, tile, input.scale.spacing * size, at);
+  }
 }
 
 // The angle of a phase at point k of its ring, if interfaces end there or the outline of the body
@@ -145,6 +167,7 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   TakeBody(placed, body, input.scale.cell_size, p.points);
   p.junctions.has_moved.assign(body.PointCount(), 0);
   p.walls = input.vertices.WallPoints();
+  FindWetted(body, p);
   FindInterfacePoints(directory, p.map, p.field, p.numbers, p.vertices, p.points);
   CollectArcs(directory, p.map, p.numbers, p.rings, p.interfaces);
   SmoothInterfaces(input.scale, input.variant.constants, p.interfaces, p.points);
@@ -164,6 +187,7 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
                     p.points);
     move_junctions();
   }
+  KeepBodyOffWalls(input, p);
   p.is_junction.assign(p.points.position.size(), 0);
   for (const ArcEnd& end : p.junctions.ends) p.is_junction[end.junction] = 1;
   ToWorld(placed, body, input.scale.cell_size, p);

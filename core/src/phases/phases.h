@@ -41,6 +41,9 @@ struct Phases {
   JunctionScratch junctions;
   std::vector<std::uint8_t> is_junction;  ///< By shared point: whether interfaces end there.
   const WallVertices* walls = nullptr;    ///< VertexScratch::WallPoints of the body.
+  /// By point of the body: the next point of its ring, if the ring runs along a wall to it; else
+  /// PhaseArc::kNoEnd. Empty without walls.
+  std::vector<std::uint32_t> wet_next;
   PhaseAreaScratch areas;
   PhaseRepairScratch repair;
 };
@@ -55,6 +58,7 @@ struct PhaseInput {
   const Crossings& crossings;
   const RingTopology& topology;
   const VertexScratch& vertices;
+  const WallField& walls;                         ///< Unused if `vertices` has no walls.
   const Percolation* percolation = nullptr;       ///< Null without copies of particles.
   std::span<const std::uint32_t> originals = {};  ///< By copy: its particle.
 };

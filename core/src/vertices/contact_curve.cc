@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "walls/point_math.h"
+#include "walls/tile_point.h"
 
 namespace partiemc {
 namespace {
@@ -95,9 +96,7 @@ bool IsFree(const ContactCurve::Surroundings& around, const WallPlace& contact, 
   if (around.tile == kNoTile) return true;
   const WallLines& lines = around.walls.lines();
   const WallEdge& edge = lines.edges()[contact.edge];
-  const TileCoordinate& tile = around.directory[around.tile];
-  const Point origin{static_cast<double>(std::int64_t{tile.x} << kTileShift),
-                     static_cast<double>(std::int64_t{tile.y} << kTileShift)};
+  const Point origin = OriginOf(around.directory, around.tile);
   const int steps = static_cast<int>(std::ceil(std::abs(move) / kStep));
   bool is_free = true;
   for (int step = 1; step <= steps && is_free; ++step) {

@@ -208,13 +208,22 @@ void FitContacts(const VertexInput& input, std::span<const float> sizes, WallVer
   }
 }
 
+Point KeepOffWalls(const WallField& walls, std::uint32_t tile, double spacing, const Point& given) {
+  const double clearance = kClearance * spacing;
+  Point moved = given;
+  walls.ForEachSolidNear(tile, given, [&](std::size_t, const NearestWall& nearest) {
+    if (!(nearest.height < clearance) || nearest.height < -WallField::kMostHeight) return;
+    moved = Plus(walls.lines().At(nearest.place),
+                 Times(walls.lines().edges()[nearest.place.edge].Left(), clearance));
+  });
+  return moved;
+}
+
 void PinToWalls(const VertexInput& input, std::span<const float> sizes, const WallVertices& points,
                 Rings& rings) {
   const WallField& walls = *input.walls;
   const double cell_size = input.scale.cell_size;
   for (std::size_t k = 0; k < rings.PointCount(); ++k) {
-    const double size = sizes.empty() ? 1.0 : double{sizes[k]};
-    const double clearance = kClearance * input.scale.spacing * size;
     double* const target = &rings.points[2 * k];
     if (points.kind[k] != VertexKind::kFree) {
       const Point at = walls.lines().InWorld(points.place[k]);
@@ -224,12 +233,8 @@ void PinToWalls(const VertexInput& input, std::span<const float> sizes, const Wa
     }
     if (points.tile[k] == kNoTile) continue;
     const Point given{target[0] / cell_size, target[1] / cell_size};
-    Point moved = given;
-    walls.ForEachSolidNear(points.tile[k], given, [&](std::size_t, const NearestWall& nearest) {
-      if (!(nearest.height < clearance) || nearest.height < -WallField::kMostHeight) return;
-      moved = Plus(walls.lines().At(nearest.place),
-                   Times(walls.lines().edges()[nearest.place.edge].Left(), clearance));
-    });
+    const double size = sizes.empty() ? 1.0 : double{sizes[k]};
+    const Point moved = KeepOffWalls(walls, points.tile[k], input.scale.spacing * size, given);
     if (moved == given) continue;
     target[0] = moved.x * cell_size;
     target[1] = moved.y * cell_size;

@@ -1,8 +1,10 @@
 // Where outlines meet walls: the contacts and their angles (core/WALLS.md).
 #pragma once
 
+#include <cstdint>
 #include <span>
 
+#include "base/point.h"
 #include "partiemc/result.h"
 #include "vertices/wall_vertices.h"
 
@@ -24,9 +26,13 @@ struct VertexInput;
 void FitContacts(const VertexInput& input, std::span<const float> sizes, WallVertices& points,
                  Rings& rings);
 
-/// Moves points on walls to their places (WallVertices::place). Moves free points that are in a
-/// solid, or closer to it than .02 local sizes, to this distance before its wall. Free points
-/// deeper than WallField::kMostHeight stay. `sizes`: as for FitContacts.
+/// Where a free point goes that is in a solid, or closer to it than .02 local sizes: to this
+/// distance before its wall. Other points, and those deeper than WallField::kMostHeight, stay. In
+/// cells. `tile`: WallVertices::tile of the point. `spacing`: the spacing times the local size.
+Point KeepOffWalls(const WallField& walls, std::uint32_t tile, double spacing, const Point& given);
+
+/// Moves points on walls to their places (WallVertices::place), and keeps free points off walls
+/// (KeepOffWalls). `sizes`: as for FitContacts.
 void PinToWalls(const VertexInput& input, std::span<const float> sizes, const WallVertices& points,
                 Rings& rings);
 

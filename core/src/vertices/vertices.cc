@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <span>
 
@@ -136,11 +137,10 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   rings.points.resize(2 * std::size_t{count});
   rings.normals.resize(2 * std::size_t{count});
   placed.roots.resize(2 * std::size_t{count});
-  const bool has_walls = scratch.meets_walls =
-      input.walls != nullptr &&
-      std::ranges::any_of(vertices.meets_wall, [](std::uint8_t meets) { return meets != 0; });
+  const bool has_walls = scratch.has_walls = input.walls != nullptr;
+  const bool meets_walls = has_walls && std::ranges::any_of(vertices.meets_wall, std::identity());
   scratch.sizes.resize(input.scale.has_own_sizes ? count : 0);
-  scratch.offset_factors.resize(has_walls ? count : 0);
+  scratch.offset_factors.resize(meets_walls ? count : 0);
   if (has_walls) scratch.walls.Resize(count);
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     std::size_t point = rings.offsets[ring];
@@ -154,8 +154,8 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
       rings.normals[2 * point] = vertices.normal[i].x;
       rings.normals[2 * point + 1] = vertices.normal[i].y;
       if (!vertices.size.empty()) scratch.sizes[point] = vertices.size[i];
-      if (has_walls) {
-        scratch.walls.Copy(vertices.walls, i, point);
+      if (has_walls) scratch.walls.Copy(vertices.walls, i, point);
+      if (meets_walls) {
         const bool is_free = vertices.walls.kind[i] == VertexKind::kFree;
         scratch.offset_factors[point] = is_free ? static_cast<float>(vertices.SizeOf(i)) : 0;
       }
@@ -164,14 +164,12 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   });
   rings.outer_of = topology.outer_of;
   std::iota(placed.kept_as.begin(), placed.kept_as.end(), 0u);
-  if (has_walls) FitContacts(input, scratch.sizes, scratch.walls, rings);
-  CorrectVolume(input, {scratch.sizes, has_walls ? scratch.offset_factors : scratch.sizes},
+  if (meets_walls) FitContacts(input, scratch.sizes, scratch.walls, rings);
+  CorrectVolume(input, {scratch.sizes, meets_walls ? scratch.offset_factors : scratch.sizes},
                 scratch.offset_points, area_offset, rings);
-  if (has_walls) {
-    FitContacts(input, scratch.sizes, scratch.walls, rings);
-    PinToWalls(input, scratch.sizes, scratch.walls, rings);
-    ListContacts(scratch.walls, rings);
-  }
+  if (meets_walls) FitContacts(input, scratch.sizes, scratch.walls, rings);
+  if (has_walls) PinToWalls(input, scratch.sizes, scratch.walls, rings);
+  if (meets_walls) ListContacts(scratch.walls, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
   return RepairRings(placed.roots, scratch.repair, rings);
@@ -213,7 +211,7 @@ bool PlaceVertices(const VertexInput& input, std::optional<double>& area_offset,
   const RingTopology& topology = input.topology;
   rings.Clear();
   placed.self_intersections = 0;
-  scratch.meets_walls = false;
+  scratch.has_walls = false;
   placed.group_of_ring.clear();
   placed.point_of_segment.resize(topology.segments.size());
   placed.kept_as.resize(topology.RingCount());

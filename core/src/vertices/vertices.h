@@ -85,15 +85,15 @@ struct RingVertices {
 struct VertexScratch {
   std::vector<double> points;  ///< One or two for each segment; not for `virtual-plane`.
   RingVertices vertices;       ///< `virtual-plane` only.
-  WallVertices walls;          ///< By point of the rings, if they meet walls.
-  bool meets_walls = false;
+  WallVertices walls;          ///< By point of the rings, if there are walls.
+  bool has_walls = false;
   std::vector<float> sizes;           ///< By point: the local size; empty for equal sizes.
   std::vector<float> offset_factors;  ///< By point, if rings meet walls (PointSizes::factors).
   std::vector<double> offset_points;  ///< Scratch of CorrectVolume.
   RepairScratch repair;
 
-  /// By point of the rings; null if no ring meets a wall.
-  const WallVertices* WallPoints() const { return meets_walls ? &walls : nullptr; }
+  /// By point of the rings; null without walls.
+  const WallVertices* WallPoints() const { return has_walls ? &walls : nullptr; }
 };
 
 /// The frame, the parameters and the results of the earlier stages.

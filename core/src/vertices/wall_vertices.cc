@@ -265,7 +265,8 @@ class WallVertexFinder {
     return !lines_.edges()[place.edge].is_endless && (place.share == 0 || place.share == 1);
   }
 
-  // The sharpest corner of the walls between the places of two successive vertices.
+  // The sharpest corner of the walls between the places of two successive vertices that is behind
+  // no wall.
   std::optional<WallPlace> CornerBetween(std::size_t k, std::size_t next) const {
     const WallPlace &from = v_.walls.place[k], &to = v_.walls.place[next];
     const WallEdge &a = lines_.edges()[from.edge], &b = lines_.edges()[to.edge];
@@ -275,7 +276,7 @@ class WallVertexFinder {
     const auto consider = [&](const WallPlace& place, const WallEdge& before,
                               const WallEdge& after) {
       const double cosine = Dot(before.unit, after.unit);
-      if (cosine >= straightest) return;
+      if (cosine >= straightest || IsBehindWall(v_.walls.tile[k], lines_.At(place))) return;
       straightest = cosine;
       sharpest = place;
     };

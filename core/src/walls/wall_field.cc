@@ -6,6 +6,7 @@
 
 #include "base/cancellation.h"
 #include "base/parallel.h"
+#include "walls/tile_point.h"
 
 namespace partiemc {
 namespace {
@@ -33,11 +34,6 @@ constexpr std::uint32_t kTilesPerCheck = 1 << 10;
 
 // The height of the marks of a row of tiles.
 double MarkOf(std::int32_t row) { return static_cast<double>(row) * kTileSize - kMark; }
-
-Point OriginOf(const TileDirectory& directory, std::uint32_t tile) {
-  return {static_cast<double>(std::int64_t{directory[tile].x} << kTileShift),
-          static_cast<double>(std::int64_t{directory[tile].y} << kTileShift)};
-}
 
 Point MiddleOf(const TileDirectory& directory, std::uint32_t tile) {
   const Point origin = OriginOf(directory, tile);
@@ -84,23 +80,6 @@ double CrossesRowAt(const WallEdge& edge, double y) {
 double CrossesColumnAt(const WallEdge& edge, double x) {
   return edge.from.y + (x - edge.from.x) / (edge.to.x - edge.from.x) * (edge.to.y - edge.from.y);
 }
-
-// A point among the four nodes around it.
-struct Surrounded {
-  int i, j;     // The node left of the point and below it, relative to the tile.
-  double u, v;  // The point relative to this node.
-
-  // Takes a point of a tile, or of a tile beside it.
-  Surrounded(const TileDirectory& directory, std::uint32_t tile, const Point& point) {
-    const Point origin = OriginOf(directory, tile);
-    const double x = std::clamp<double>(point.x - origin.x, -kTileSize, 2 * kTileSize - 1.001);
-    const double y = std::clamp<double>(point.y - origin.y, -kTileSize, 2 * kTileSize - 1.001);
-    i = static_cast<int>(std::floor(x));
-    j = static_cast<int>(std::floor(y));
-    u = x - i;
-    v = y - j;
-  }
-};
 
 // F at a point of a tile and its neighbours, by bilinear interpolation.
 double Interpolate(const TileDirectory& directory, const LevelSet& level_set, std::uint32_t tile,
@@ -436,6 +415,7 @@ void WallField::ExtendFluid(const TileDirectory& directory, const Scale& scale,
 
 void WallField::Apply(const ParticleBins& bins, const Scale& scale, LevelSet& level_set) {
   const TileDirectory& directory = bins.tiles;
+  if (scale.has_own_sizes) sizes_.reserve(near_count_);  // Doubling would take more memory.
   sizes_.resize(scale.has_own_sizes ? near_count_ : 0);
   ParallelFor(near_count_, [&](std::size_t k) {
     if (near_of_tile_[near_[k].tile] == kSolid) return;

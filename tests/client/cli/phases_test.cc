@@ -78,7 +78,7 @@ TEST(PhasesReplay, PhasesEndAtWalls) {
   const Ran other = RunPartiemc(
       {"replay", csv, "--spacing", "1", "--phases", "type=1,2", "--wall", "kind=3", "--local"});
   EXPECT_NE(other.exit_code, 0);
-  EXPECT_THAT(other.error, HasSubstr("that of --phases"));
+  EXPECT_THAT(other.error, HasSubstr("the attribute of --phases"));
 }
 
 // A box of 30 x 24 with a drop of type 2 across its corner.

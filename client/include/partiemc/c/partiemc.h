@@ -169,8 +169,9 @@ typedef struct partiemc_options {
   const double* walls;
   const uint32_t* wall_sizes;
   size_t wall_count;
-  /* Phases (`phase_attribute`) whose particles are walls. The outline of these particles is a
-   * further wall. At most 16. Excludes the same options as `walls`. */
+  /* Phases (`phase_attribute`) whose particles are walls, none of them in `phases`. The outline of
+   * these particles is a further wall. At most 16. Excludes what `walls` excludes, and the filter.
+   */
   const int32_t* wall_phases;
   size_t wall_phase_count;
   /* Walls at which a surface is cut, at most one for each side of each axis, and none across a

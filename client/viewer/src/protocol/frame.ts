@@ -22,7 +22,7 @@ export interface Rings {
   cuts: Uint32Array;
   /** Vertices, ascending, whose segment to the next one lies on a wall. */
   wetted: Uint32Array;
-  /** Vertices, ascending, where an outline meets a wall, or a phase meets two other phases, or one and the outside. */
+  /** Vertices, ascending, where an outline meets a wall, or a phase meets two others, or one and the outside. */
   contacts: Uint32Array;
   /** Of each contact: the angle of the fluid or phase there, in radians. */
   contactAngles: Float32Array;
