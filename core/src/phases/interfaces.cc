@@ -9,6 +9,7 @@
 #include "vertices/placement.h"
 #include "vertices/ring_filters.h"
 #include "walls/point_math.h"
+#include "walls/tile_point.h"
 
 namespace partiemc {
 namespace {
@@ -17,9 +18,8 @@ namespace {
 constexpr int kRootSteps = 3;
 
 Point NodeAt(const TileDirectory& directory, std::uint32_t tile, double i, double j) {
-  const TileCoordinate& at = directory[tile];
-  return {static_cast<double>(std::int64_t{at.x} << kTileShift) + i,
-          static_cast<double>(std::int64_t{at.y} << kTileShift) + j};
+  const Point origin = OriginOf(directory, tile);
+  return {origin.x + i, origin.y + j};
 }
 
 // The fraction of an edge at which the difference of its phases is 0, by the Illinois method.

@@ -9,6 +9,7 @@
 
 #include "base/bits.h"
 #include "vertices/measure.h"
+#include "walls/tile_point.h"
 
 namespace partiemc {
 namespace {
@@ -205,8 +206,7 @@ void SumRegions(const RegionInput& input, PhaseImages& images, PhaseAreaScratch&
   for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
     const std::uint32_t first = bins.offsets[tile], last = bins.offsets[tile + 1];
     if (first == last) continue;
-    const Point origin{static_cast<double>(std::int64_t{bins.tiles[tile].x} << kTileShift),
-                       static_cast<double>(std::int64_t{bins.tiles[tile].y} << kTileShift)};
+    const Point origin = OriginOf(bins.tiles, tile);
     const auto only = OnlyRegion(input.field, input.phases, tile);
     if (only && !has_copies) {
       const std::uint32_t region = images.RegionOf(only->label - 1u, only->component);

@@ -170,8 +170,8 @@ typedef struct partiemc_options {
   const uint32_t* wall_sizes;
   size_t wall_count;
   /* Phases (`phase_attribute`) whose particles are walls, none of them in `phases`. The outline of
-   * these particles is a further wall. At most 16. Excludes what `walls` excludes, and the filter.
-   */
+   * these particles is a further wall. At most 16. Excludes the noise filter, and what `walls`
+   * excludes. */
   const int32_t* wall_phases;
   size_t wall_phase_count;
   /* Walls at which a surface is cut, at most one for each side of each axis, and none across a
