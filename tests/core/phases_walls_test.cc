@@ -205,6 +205,38 @@ TEST(PhasesAtWalls, AnyNumberOfThreadsAndAnyInstructionSetGivesTheSameBits) {
   support::ForEachInstructionSet([&] { EXPECT_EQ(ReconstructOnce(parameters, layers), expected); });
 }
 
+// Two layers slosh in a tank; each frame has another order of particles.
+TEST(PhasesAtWalls, LayersKeepTheirIdentitiesWhileTheySlosh) {
+  const auto at = [](double, double y) { return y < 10 ? 1 : 2; };
+  const Particles layers = Labelled(kTankColumns, kTankRows, .1, at);
+  const auto reconstructor = Reconstructor::Create(PhasesAt({kWideTank}, 2));
+  ASSERT_TRUE(reconstructor.ok());
+  Random random(6);
+  State state;
+  Workspace workspace;
+  Result result;
+  std::vector<std::uint64_t> first;
+  for (int frame = 0; frame < 40; ++frame) {
+    SCOPED_TRACE(frame);
+    Particles moved = layers;
+    for (std::size_t k = 0; k < moved.size(); ++k) {
+      const double wave = std::cos(std::numbers::pi * moved.x(k) / kTankColumns);
+      moved.xy[2 * k + 1] *= 1 + .12 * std::sin(frame / 6.0) * wave;
+      moved.ids.push_back(k);
+    }
+    const Particles given = support::Permuted(moved, random);
+    ASSERT_TRUE(reconstructor->Reconstruct(given.AsFrame(), state, workspace, result).ok());
+    std::vector<std::uint64_t> identities{result.rings.measures.at(0).identity};
+    for (const Result& phase : result.sections) {
+      EXPECT_EQ(phase.rings.RingCount(), 1u);
+      identities.push_back(phase.rings.measures.at(0).identity);
+    }
+    if (frame == 0) first = identities;
+    EXPECT_EQ(identities, first);
+    EXPECT_NEAR(result.sections[0].statistics.area, 400, 2);
+  }
+}
+
 TEST(PhasesAtWalls, PhasesDivideTheBodyInRandomFrames) {
   std::size_t contacts = 0, wetted = 0, beyond = 0, points = 0;
   for (std::uint64_t seed = 1; seed <= support::Tries(600u) && !HasFailure(); ++seed) {
