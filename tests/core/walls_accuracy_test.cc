@@ -199,5 +199,46 @@ TEST(WallsAccuracy, TanksOfParticlesHaveStraightWallsAndCorners) {
   }
 }
 
+// The distance of a point from the nearest vertex.
+double DistanceFrom(const Rings& rings, double x, double y) {
+  double nearest = 1e300;
+  for (std::size_t p = 0; p < rings.points.size(); p += 2) {
+    nearest = std::min(nearest, std::hypot(rings.points[p] - x, rings.points[p + 1] - y));
+  }
+  return nearest;
+}
+
+// Rotated full tanks of lines, with two sharp and two obtuse corners.
+TEST(WallsAccuracy, FluidFillsTheCornersOfTanks) {
+  constexpr double kSide = 26;
+  std::printf("%8s %6s %7s\n", "degrees", "noise", "corner");
+  for (const double degrees : {30.0, 45.0, 60.0, 75.0, 90.0}) {
+    for (const double noise : {0.0, .1}) {
+      double farthest = 0;
+      Random random(89);
+      for (int k = 0; k < kPlacements; ++k) {
+        const double angle = degrees * std::numbers::pi / 180, turn = random.Uniform(0, 7);
+        const double x = random.Uniform(-3, 3), y = random.Uniform(-3, 3);
+        const double ux = kSide * std::cos(turn), uy = kSide * std::sin(turn);
+        const double vx = kSide * std::cos(turn + angle), vy = kSide * std::sin(turn + angle);
+        const Wall tank{{x, y, x + ux, y + uy, x + ux + vx, y + uy + vy, x + vx, y + vy}};
+        const Body fluid{[&](double px, double py) { return -support::HeightAbove(tank, px, py); },
+                         60};
+        Particles particles = Shaken(Filled(fluid, random, Equal), random, noise);
+        particles.volumes.clear();
+        const Result result =
+            support::ReconstructOnce({.spacing = 1.0, .walls = {tank}}, particles);
+        EXPECT_TRUE(Validate(result).ok());
+        for (std::size_t corner = 0; corner < tank.points.size(); corner += 2) {
+          farthest = std::max(
+              farthest, DistanceFrom(result.rings, tank.points[corner], tank.points[corner + 1]));
+        }
+      }
+      std::printf("%8.0f %6.2f %7.4f\n", degrees, noise, farthest);
+      EXPECT_LT(farthest, 1e-9);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace partiemc

@@ -9,7 +9,7 @@
 namespace partiemc {
 namespace {
 
-constexpr int kGentleRounds = 4, kMostRounds = 24;
+constexpr int kMostRounds = 24;
 
 // The rings of the body or of a phase, by numbers of shared points.
 struct Outline {
@@ -78,7 +78,7 @@ struct Repair {
   }
 
   // Returns whether any point moved.
-  bool Retreat(bool all_the_way) {
+  bool MovePoints(bool all_the_way) {
     bool has_moved = false;
     for (std::size_t k = 0; k < points.size(); ++k) {
       if (!s.is_marked[k / 2] || points[k] == roots[k]) continue;
@@ -92,7 +92,7 @@ struct Repair {
 }  // namespace
 
 bool RepairPhases(const Rings& body, std::span<const PhaseRings> phases,
-                  std::span<const double> roots, PhaseRepairScratch& scratch,
+                  std::span<const double> roots, Retreat retreat, PhaseRepairScratch& scratch,
                   std::span<double> points) {
   const auto for_each_outline = [&](auto visit) {
     visit(Outline{{}, body.offsets, body.outer_of});
@@ -109,10 +109,11 @@ bool RepairPhases(const Rings& body, std::span<const PhaseRings> phases,
       for_each_outline([&](const Outline& outline) { repair.MarkMisplaced(outline); });
       if (!repair.has_misplaced) return true;
     }
-    const bool all_the_way = repair.has_misplaced || round >= kGentleRounds;
-    if (round < kMostRounds && repair.Retreat(all_the_way)) continue;
+    const bool all_the_way =
+        repair.has_misplaced || retreat == Retreat::kAllTheWay || round >= kHalfWayRounds;
+    if (round < kMostRounds && repair.MovePoints(all_the_way)) continue;
     std::ranges::fill(scratch.is_marked, std::uint8_t{1});
-    if (!repair.Retreat(true)) return false;
+    if (!repair.MovePoints(true)) return false;
   }
 }
 

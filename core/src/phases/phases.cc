@@ -191,7 +191,8 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   p.is_junction.assign(p.points.position.size(), 0);
   for (const ArcEnd& end : p.junctions.ends) p.is_junction[end.junction] = 1;
   ToWorld(placed, body, input.scale.cell_size, p);
-  if (!RepairPhases(body, p.rings, p.world_roots, p.repair, p.world)) return false;
+  const Retreat retreat = input.vertices.HowToReturn();
+  if (!RepairPhases(body, p.rings, p.world_roots, retreat, p.repair, p.world)) return false;
   std::copy_n(p.world.begin(), body.points.size(), body.points.begin());
   for (std::size_t k = 0; k < body.PointCount(); ++k) {
     if (p.junctions.has_moved[k] == 0) continue;

@@ -9,9 +9,6 @@
 namespace partiemc {
 namespace {
 
-// In this number of rounds, the ends of touching segments move only half way to their roots.
-constexpr int kGentleRounds = 4;
-
 // After this number of rounds all points return at once, because adversarial frames could need a
 // round for every few points. Ordinary frames need none; hostile test frames need up to nine.
 constexpr int kMostRounds = 24;
@@ -97,8 +94,8 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
 }
 
 // Moves the marked points towards their roots; returns whether any point moved.
-bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratch& scratch,
-             Rings& rings) {
+bool MovePoints(std::span<const double> roots, bool all_the_way, const RepairScratch& scratch,
+                Rings& rings) {
   bool has_moved = false;
   for (std::size_t k = 0; k < rings.points.size(); ++k) {
     if (!scratch.is_marked[k / 2] || rings.points[k] == roots[k]) continue;
@@ -110,12 +107,13 @@ bool Retreat(std::span<const double> roots, bool all_the_way, const RepairScratc
 
 }  // namespace
 
-bool RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& rings) {
+bool RepairRings(std::span<const double> roots, Retreat retreat, RepairScratch& scratch,
+                 Rings& rings) {
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
     const std::size_t touching = CountTouchingPairs(rings.points, rings.offsets, scratch.pairs);
     scratch.is_marked.assign(rings.PointCount(), 0);
-    bool all_the_way = round >= kGentleRounds;
+    bool all_the_way = retreat == Retreat::kAllTheWay || round >= kHalfWayRounds;
     if (touching > 0) {
       for (const auto& [first, second] : scratch.pairs.pairs) {
         MarkSegment(rings, first, scratch.is_marked);
@@ -128,11 +126,11 @@ bool RepairRings(std::span<const double> roots, RepairScratch& scratch, Rings& r
       MarkMisplacedRings(rings, scratch);
       all_the_way = true;
     }
-    if (round < kMostRounds && Retreat(roots, all_the_way, scratch, rings)) continue;
+    if (round < kMostRounds && MovePoints(roots, all_the_way, scratch, rings)) continue;
     // All points return. Either the rounds are used up, or every marked point is at its root
     // already, so an unmarked point must move.
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
-    if (!Retreat(roots, true, scratch, rings)) return false;
+    if (!MovePoints(roots, true, scratch, rings)) return false;
   }
 }
 

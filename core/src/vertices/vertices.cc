@@ -172,7 +172,7 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   if (meets_walls) ListContacts(scratch.walls, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
-  return RepairRings(placed.roots, scratch.repair, rings);
+  return RepairRings(placed.roots, scratch.HowToReturn(), scratch.repair, rings);
 }
 
 // Places the rings of all placements except `virtual-plane`, segment by segment.

@@ -94,6 +94,7 @@ struct VertexScratch {
 
   /// By point of the rings; null without walls.
   const WallVertices* WallPoints() const { return has_walls ? &walls : nullptr; }
+  Retreat HowToReturn() const { return has_walls ? Retreat::kAllTheWay : Retreat::kHalfWay; }
 };
 
 /// The frame, the parameters and the results of the earlier stages.

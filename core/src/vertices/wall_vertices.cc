@@ -76,18 +76,12 @@ class WallVertexFinder {
     return crossed;
   }
 
-  // Whether a crossed edge, from its inside node on, meets a wall before it leaves the fluid.
-  bool MeetsWall(const CrossedEdge& edge) const {
+  // Where a crossed edge, from its inside node on, first meets a wall, unless it leaves the fluid
+  // before. If no line near the tile crosses an edge into the solid: the place nearest to the
+  // outside node.
+  std::optional<WallPlace> FindWall(std::uint32_t tile, const CrossedEdge& edge) const {
     const double above = walls_.HeightAt(edge.inside), below = walls_.HeightAt(edge.outside);
-    if (above <= 0 || below > 0) return false;
-    const double in = walls_.FluidAt(input_.level_set, edge.inside);
-    const double out = walls_.FluidAt(input_.level_set, edge.outside);
-    return out < 0 || in >= 0 || above / (above - below) <= in / (in - out);
-  }
-
-  // Where the edge, from its inside node on, first meets a wall; if no line near the tile crosses
-  // the edge, the place nearest to the outside node.
-  WallPlace PlaceOn(std::uint32_t tile, const CrossedEdge& edge) const {
+    if (above <= 0 || below > 0) return std::nullopt;
     const Point way = Minus(edge.to, edge.from);
     std::optional<WallPlace> place;
     double first = 2;
@@ -102,6 +96,9 @@ class WallVertexFinder {
       first = at;
       place = WallPlace{k, share};
     }
+    const double in = walls_.FluidAt(input_.level_set, edge.inside);
+    const double out = walls_.FluidAt(input_.level_set, edge.outside);
+    if (out >= 0 && in < 0 && std::min(first, 1.0) > in / (in - out)) return std::nullopt;
     return place ? *place : walls_.Nearest(tile, edge.to).place;
   }
 
@@ -123,9 +120,11 @@ class WallVertexFinder {
     const bool is_near = walls_.HeightAt({cell.tile, cell.i, cell.j}) < WallField::kMostHeight;
     v_.walls.tile[vertex] = is_near ? cell.tile : kNoTile;
     v_.walls.kind[vertex] = VertexKind::kFree;
-    v_.walls.is_wet[vertex] = is_near && MeetsWall(edge);
-    if (!v_.walls.is_wet[vertex]) return;
-    SetWall(vertex, PlaceOn(cell.tile, edge), VertexKind::kWall);
+    const std::optional<WallPlace> place =
+        is_near ? FindWall(cell.tile, edge) : std::optional<WallPlace>();
+    v_.walls.is_wet[vertex] = place.has_value();
+    if (!place) return;
+    SetWall(vertex, *place, VertexKind::kWall);
     // The anchor stays on the lattice edge, away from its nodes.
     const Point &a = edge.from, &b = edge.to, &at = v_.point[vertex];
     const double share = std::clamp((at.x - a.x) * (b.x - a.x) + (at.y - a.y) * (b.y - a.y),
@@ -141,17 +140,40 @@ class WallVertexFinder {
     v_.walls.tile[vertex] = v_.walls.tile[2 * segment];
     v_.walls.is_wet[vertex] = to_wall;
     v_.walls.kind[vertex] = VertexKind::kFree;
-    if (!from_wall && !to_wall) return;
     const Point &a = v_.point[2 * segment], &b = v_.point[2 * next];
+    const Point middle{(a.x + b.x) / 2, (a.y + b.y) / 2};
     if (from_wall && to_wall) {
       SetWall(vertex, PlaceInCell(cell, a, b), VertexKind::kWall);
-    } else {
-      const Point middle{(a.x + b.x) / 2, (a.y + b.y) / 2};
+    } else if (from_wall || to_wall) {
       SetWall(vertex, walls_.Nearest(cell.tile, middle).place, VertexKind::kContact);
     }
-    v_.root[vertex] =
-        ClampToCell(input_.bins.tiles, cell,
-                    input_.crossings.segments[input_.topology.segments[segment]], v_.point[vertex]);
+    const bool is_free = v_.walls.kind[vertex] == VertexKind::kFree;
+    v_.root[vertex] = AnchorInCell(segment, next, is_free ? v_.root[vertex] : v_.point[vertex]);
+  }
+
+  // The point of the segment's cell nearest to a vertex. If it is behind a wall, a point on the way
+  // from the middle of the segment to its inside node.
+  Point AnchorInCell(std::size_t segment, std::size_t next, const Point& vertex) const {
+    const ActiveCell& cell = CellOf(segment);
+    const auto clamped = [&](const Point& point) {
+      return ClampToCell(input_.bins.tiles, cell,
+                         input_.crossings.segments[input_.topology.segments[segment]], point);
+    };
+    const Point anchor = clamped(vertex);
+    if (!IsNearWall(cell) || !IsBehindWall(cell.tile, anchor)) return anchor;
+    const Point inside = EdgeOf(segment).from;
+    const Point middle = Times(Plus(v_.root[2 * segment], v_.root[2 * next]), .5);
+    for (const double share : {0.0, .5, .75, .875}) {
+      const Point point = clamped(Plus(middle, Times(Minus(inside, middle), share)));
+      if (!IsBehindWall(cell.tile, point)) return point;
+    }
+    return anchor;
+  }
+
+  // Whether a wall may be in a cell.
+  bool IsNearWall(const ActiveCell& cell) const {
+    constexpr double kDiagonal = 1.5;
+    return std::abs(walls_.HeightAt({cell.tile, cell.i, cell.j})) < kDiagonal;
   }
 
   // The sharpest corner of the walls in a cell that is behind no wall and not at `a` or `b`, the
@@ -298,11 +320,12 @@ class WallVertexFinder {
     return sharpest;
   }
 
-  // Whether a point is in a solid near the tile, deeper than rounding but less than one cell.
+  // Whether a point is in a solid near the tile, deeper than rounding but less than two cells.
   bool IsBehindWall(std::uint32_t tile, const Point& point) const {
     bool is_behind = false;
     walls_.ForEachSolidNear(tile, point, [&](std::size_t, const NearestWall& nearest) {
-      is_behind |= nearest.height < -10 * kCornerTolerance && nearest.height > -1;
+      is_behind |=
+          nearest.height < -10 * kCornerTolerance && nearest.height > -WallField::kMostHeight / 2;
     });
     return is_behind;
   }

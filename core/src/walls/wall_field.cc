@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <optional>
 
 #include "base/cancellation.h"
 #include "base/parallel.h"
+#include "walls/point_math.h"
 #include "walls/tile_point.h"
 
 namespace partiemc {
@@ -13,6 +15,10 @@ namespace {
 
 // In cells. Fluid farther from a wall than this never touches it. Less than kMostHeight.
 constexpr double kMostReach = 3.5;
+// In corners this factor lengthens the reach, because the field rounds a corner of the fluid.
+constexpr double kCornerReach = 1.5;
+// The cosines of the turn between the walls of corners of 150 and of 30 degrees.
+constexpr double kFlatCorner = .867, kSharpCorner = -.867;
 // The nodes around a point on a wall are at most this far from the wall, in cells.
 constexpr float kBeside = 1.5F;
 // Nodes deeper in the solid than this, in cells, need no value of the fluid: no lattice edge joins
@@ -374,41 +380,46 @@ double WallField::SizeAt(const TileDirectory& directory, std::uint32_t tile,
   return weight > 0 ? sum / weight : 0;
 }
 
-// Fluid nearer to the wall below a node than this, in cells, touches it.
-double WallField::ReachOf(const TileDirectory& directory, const Scale& scale, std::uint32_t tile,
-                          const Point& node) const {
-  if (!scale.has_own_sizes) return kReach * scale.spacing;
-  const Point foot = lines_.At(Nearest(tile, node).place);
-  return std::min(kReach * scale.spacing * SizeAt(directory, tile, foot), kMostReach);
+// The point at the height `reach` above both walls of a corner, if a node is nearer to both.
+// `floor_place`: the place on the walls that is nearest to the node.
+std::optional<Point> WallField::AboveCorner(std::uint32_t tile, const WallPlace& floor_place,
+                                            double reach) const {
+  const WallEdge& floor = lines_.edges()[floor_place.edge];
+  const Point above_floor = Plus(lines_.At(floor_place), Times(floor.Left(), reach));
+  const auto is_below = [&](const NearestWall& wall) { return wall.height < .99 * reach; };
+  const NearestWall nearest = Nearest(tile, above_floor);
+  if (!is_below(nearest)) return std::nullopt;
+  const WallEdge& side = lines_.edges()[nearest.place.edge];
+  const double cosine = Dot(floor.Left(), side.Left());
+  if (cosine > kFlatCorner || cosine < kSharpCorner) return std::nullopt;
+  const double missing = reach - Dot(Minus(above_floor, side.from), side.Left());
+  const Point above = Plus(above_floor, Times(floor.unit, missing / Dot(floor.unit, side.Left())));
+  return is_below(Nearest(tile, above)) ? std::nullopt : std::optional(above);
 }
 
 void WallField::ExtendFluid(const TileDirectory& directory, const Scale& scale,
                             const LevelSet& level_set, NearTile& near) const {
-  constexpr int kMostSteps = 4;  // In a corner, the way up leads to the next wall.
   const double most_reach = kReach * scale.spacing * scale.sizes.largest;
   const Point origin = OriginOf(directory, near.tile);
   for (int node = 0; node < kTileNodes; ++node) {
     near.fluid[node] = level_set.tiles[near.tile][node];
     const float height = near.height[node];
     if (near.fluid[node] < 0 || height >= most_reach || height < -kMostDepth) continue;
-    Point point{origin.x + node % kTileSize, origin.y + node / kTileSize};
-    const double reach = ReachOf(directory, scale, near.tile, point);
+    const Point at{origin.x + node % kTileSize, origin.y + node / kTileSize};
+    const NearestWall nearest = Nearest(near.tile, at);
+    const Point foot = lines_.At(nearest.place);
+    const double local_reach = kReach * scale.spacing * SizeAt(directory, near.tile, foot);
+    const double reach = std::min(local_reach, kMostReach);
     if (height >= reach) continue;
-    bool is_above = height > 0;
-    for (int step = 0; step < kMostSteps; ++step) {
-      const NearestWall nearest = Nearest(near.tile, point);
+    std::optional<Point> point =
+        AboveCorner(near.tile, nearest.place, std::min(kCornerReach * reach, kMostReach));
+    if (!point) {
       const double distance = std::abs(nearest.height);
-      if (is_above && distance > reach - .01) break;
-      const Point on = lines_.At(nearest.place);
-      Point up = lines_.edges()[nearest.place.edge].Left();
-      if (distance > 1e-3) {
-        const double sign = (is_above ? 1 : -1) / distance;
-        up = {(point.x - on.x) * sign, (point.y - on.y) * sign};
-      }
-      point = {on.x + reach * up.x, on.y + reach * up.y};
-      is_above = true;
+      const Point up = distance > 1e-3 ? Times(Minus(at, foot), (height > 0 ? 1 : -1) / distance)
+                                       : lines_.edges()[nearest.place.edge].Left();
+      point = Plus(foot, Times(up, reach));
     }
-    const auto above = static_cast<float>(Interpolate(directory, level_set, near.tile, point));
+    const auto above = static_cast<float>(Interpolate(directory, level_set, near.tile, *point));
     if (above < 0) near.fluid[node] = above;
   }
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -19,8 +20,9 @@ namespace partiemc {
 ///
 /// Kernels see no particles beyond a wall, so F near a wall does not show whether the fluid touches
 /// it. An outside node lower than the reach, `kReach` local sizes, therefore has the F of the point
-/// straight above it at this height, if that point is inside. Then max(F, -w) replaces F on the
-/// lattice: its zeros are the outline of the fluid, cut at the walls.
+/// straight above it at this height, if that point is inside. In a corner of two walls, this is the
+/// point at 1.5 times the reach above both, because the field rounds corners of the fluid. Then
+/// max(F, -w) replaces F on the lattice: its zeros are the outline of the fluid, cut at the walls.
 ///
 /// A frame calls ListLines, FindTiles and Apply, in this order.
 class WallField {
@@ -104,8 +106,8 @@ class WallField {
   void CollectCrossings(std::int32_t row);
   void SetTile(const TileDirectory& directory, std::uint32_t tile);
   void MeasureHeights(const TileDirectory& directory, NearTile& near) const;
-  double ReachOf(const TileDirectory& directory, const Scale& scale, std::uint32_t tile,
-                 const Point& node) const;
+  std::optional<Point> AboveCorner(std::uint32_t tile, const WallPlace& floor_place,
+                                   double reach) const;
   void ExtendFluid(const TileDirectory& directory, const Scale& scale, const LevelSet& level_set,
                    NearTile& near) const;
 
