@@ -203,7 +203,7 @@ TEST(NearMoments, AreThoseOfAllParticlesAtEachAskedNodeForAnyRadius) {
     const NodeBlocks blocks = BlocksOf(SomeNodes(random, 3));
     support::ForEachInstructionSet([&] {
       MomentSums sums{};
-      AddNearMoments(near, nullptr, radius, blocks, false, sums);
+      AddNearMoments(near, false, radius, blocks, false, sums);
       for (int b = 0; b < blocks.count; ++b) {
         for (int node = 0; node < NodeBlock::kNodes; ++node) {
           const int column = blocks[b].column + node % NodeBlock::kSide;
@@ -245,7 +245,7 @@ TEST(NearMoments, DoNotDependOnWhatLiesBehindTheLastParticle) {
     near.count = 3;
     for (int k = 0; k < near.count; ++k) near.x[k] = near.y[k] = 4.25f * static_cast<float>(k);
     MomentSums sums{};
-    AddNearMoments(near, nullptr, 2.5f, blocks, false, sums);
+    AddNearMoments(near, false, 2.5f, blocks, false, sums);
     std::vector<float> at_nodes;
     for (int b = 0; b < blocks.count; ++b) {
       for (const auto& channel : {sums[b].kernel, sums[b].xy}) {

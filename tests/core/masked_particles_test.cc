@@ -117,6 +117,33 @@ TEST(MaskedParticles, OfAnySmallNumberOfParticlesAreRight) {
   }
 }
 
+TEST(MaskedParticles, OfDifferentSizesReachANodeOfTheTile) {
+  constexpr float kRadius = 1.3f, kMiddle = (kTileSize - 1) / 2.0f;
+  support::Random random(4);
+  ParticleBins bins = Bin(CrowdedScene(random));
+  for (std::size_t e = 0; e < bins.particles.size(); ++e) {
+    bins.size.push_back(static_cast<float>(random.Uniform(.2, 4)));
+  }
+  CellMask mask;
+  for (std::uint64_t& row : mask) row = random.Bits() | random.Bits();
+  support::ForEachInstructionSet([&] {
+    for (std::uint32_t tile = 0; tile < bins.tiles.size(); ++tile) {
+      std::vector<Seen> expected = Expected(bins, tile, &mask), seen;
+      std::erase_if(expected, [&](const Seen& at) {
+        const float reach = kRadius * bins.size[at.particle] + kMiddle;
+        return std::max(std::abs(at.x - kMiddle), std::abs(at.y - kMiddle)) >= reach;
+      });
+      MaskedParticles(bins, tile, &mask, kRadius).ForEachBlock([&](const ParticleBlock& near) {
+        for (int k = 0; k < near.count; ++k) {
+          seen.push_back({near.particle[k], near.x[k], near.y[k]});
+          EXPECT_EQ(near.size[k], bins.size[near.particle[k]]);
+        }
+      });
+      EXPECT_EQ(seen, expected);
+    }
+  });
+}
+
 TEST(CellMasks, KnowTheCellsAroundATileAndAllThatAreNearToOne) {
   support::Random random(5);
   const ParticleBins bins = Bin(CrowdedScene(random));

@@ -22,6 +22,7 @@ struct ParticleBlock {
   using PerParticle = std::array<Value, kCapacity + kPadding>;
 
   PerParticle<float> x, y;
+  PerParticle<float> size;              ///< Only of particles chosen by their reach.
   PerParticle<std::uint32_t> particle;  ///< Index into ParticleBins::particles.
   int count = 0;
 };
@@ -40,6 +41,9 @@ class MaskedParticles {
   };
 
   MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask);
+  /// If sizes differ, leaves out particles whose kernels reach no node of the tile, and sets
+  /// ParticleBlock::size. `radius`: the kernel radius of a particle of size 1, in cells.
+  MaskedParticles(const ParticleBins& bins, std::uint32_t tile, const CellMask* mask, float radius);
 
   /// Calls visit(const ParticleBlock&) for all blocks: tile by tile in the order of Neighbourhood,
   /// within a tile in the order of the frame.
@@ -57,6 +61,8 @@ class MaskedParticles {
   bool ChooseMore();
 
   std::span<const BinnedParticle> particles_;
+  std::span<const float> sizes_;  // Empty if the reach of particles does not matter.
+  float radius_ = 0;
   std::array<List, kMaxLists> lists_;
   int list_count_ = 0;
   int list_ = 0;  // The current list.

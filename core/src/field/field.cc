@@ -74,9 +74,9 @@ void SumTile(const ParticleBins& bins, const Scale& scale, std::uint32_t tile,
     ScatterKernels(ParticlesOf(bins, tile), radius, sums);
     level_set.halo.Keep(tile, sums);
   } else {
-    MaskedParticles(bins, tile, nullptr).ForEachBlock([&](const ParticleBlock& near) {
+    MaskedParticles(bins, tile, nullptr, radius).ForEachBlock([&](const ParticleBlock& near) {
       bins.size.empty() ? ScatterNearKernels(near, WeightsOf(bins), radius, sums)
-                        : ScatterNearSizedKernels(near, bins.size.data(), radius, sums);
+                        : ScatterNearSizedKernels(near, radius, sums);
     });
   }
   // memcpy of a fixed size is inlined, unlike copy_n.
@@ -130,7 +130,8 @@ void ForEachNear(const ParticleBins& bins, const Scale& scale, std::uint32_t til
   // A kernel reaches node i from the cells i - reach to i + reach - 1: cell c extends from c to c +
   // 1.
   if (masked) Widen(mask, reach, reach - 1);
-  MaskedParticles(bins, tile, masked ? &mask : nullptr).ForEachBlock(visit);
+  MaskedParticles(bins, tile, masked ? &mask : nullptr, static_cast<float>(scale.kernel_radius))
+      .ForEachBlock(visit);
 }
 
 // Computes F at the given nodes of a tile from their moments. Returns the nodes that are inside.
@@ -145,8 +146,8 @@ BitRows SampleNodes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   }
   const auto radius = static_cast<float>(scale.kernel_radius);
   ForEachNear(bins, scale, tile, asked.rows, [&](const ParticleBlock& near) {
-    AddNearMoments(near, SizesOf(bins), radius, blocks, asked.has_kernel_sums, sums);
-    if (scale.has_grains) AddNearGrains(near, SizesOf(bins), scale, blocks, distances);
+    AddNearMoments(near, !bins.size.empty(), radius, blocks, asked.has_kernel_sums, sums);
+    if (scale.has_grains) AddNearGrains(near, scale, blocks, distances);
   });
   float* const values = level_set.tiles[tile].data();
   const BitRows inside = EvaluateNodes(asked, blocks, sums, WeightOf(bins, scale), scale, values);
@@ -256,8 +257,7 @@ void FindLocalSizes(const ParticleBins& bins, const Scale& scale, std::uint32_t 
   MomentSums sums;
   std::fill_n(sums.begin(), blocks.count, BlockSums{});
   ForEachNear(bins, scale, tile, asked, [&](const ParticleBlock& near) {
-    AddNearMoments(near, SizesOf(bins), static_cast<float>(scale.kernel_radius), blocks, false,
-                   sums);
+    AddNearMoments(near, true, static_cast<float>(scale.kernel_radius), blocks, false, sums);
   });
   for (int b = 0; b < blocks.count; ++b) {
     ForEachAsked(blocks[b], [&](int node, int i, int j) {

@@ -130,19 +130,16 @@ HWY_INLINE void AddGrains(const float* x, const float* y, const float* size, int
 
 // Calls add(b, chosen) for each block with the particles whose kernels may reach it.
 template <bool kSized, typename Add>
-HWY_INLINE void ForEachReached(const ParticleBlock& near, [[maybe_unused]] const float* size,
-                               float radius, const NodeBlocks& blocks, Add add) {
-  alignas(64) ParticleBlock::PerParticle<float> sizes;
-  if constexpr (kSized) {
-    for (int k = 0; k < near.count; ++k) sizes[k] = size[near.particle[k]];
-  }
+HWY_INLINE void ForEachReached(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
+                               Add add) {
   Chosen of_rows, of_block;
   int row = -1;
   for (int b = 0; b < blocks.count; ++b) {
     const NodeBlock& block = blocks[b];
     if (block.row != row) {
       row = block.row;
-      Choose<kSized>(near.y.data(), near.x.data(), sizes.data(), near.count, row, radius, of_rows);
+      Choose<kSized>(near.y.data(), near.x.data(), near.size.data(), near.count, row, radius,
+                     of_rows);
     }
     Choose<kSized>(of_rows.across.data(), of_rows.along.data(), of_rows.size.data(), of_rows.count,
                    block.column, radius, of_block);
@@ -151,30 +148,30 @@ HWY_INLINE void ForEachReached(const ParticleBlock& near, [[maybe_unused]] const
 }
 
 template <bool kSized>
-void AddNearMomentsOf(const ParticleBlock& near, const float* size, float radius,
-                      const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {
+void AddNearMomentsOf(const ParticleBlock& near, float radius, const NodeBlocks& blocks,
+                      bool has_kernel_sums, MomentSums& sums) {
   const float inverse_square = 1 / (radius * radius);
   const auto add = has_kernel_sums ? AddMoments<false, kSized> : AddMoments<true, kSized>;
-  ForEachReached<kSized>(near, size, radius, blocks, [&](int b, const Chosen& chosen) HWY_ATTR {
+  ForEachReached<kSized>(near, radius, blocks, [&](int b, const Chosen& chosen) HWY_ATTR {
     add(chosen.along.data(), chosen.across.data(), chosen.size.data(), chosen.count, inverse_square,
         sums[b]);
   });
 }
 
-void AddNearGrains(const ParticleBlock& near, const float* size, const Scale& scale,
-                   const NodeBlocks& blocks, GrainDistances& distances) {
+void AddNearGrains(const ParticleBlock& near, const Scale& scale, const NodeBlocks& blocks,
+                   GrainDistances& distances) {
   const auto spacing = static_cast<float>(scale.spacing);
   const auto radius = static_cast<float>(scale.kernel_radius);
-  ForEachReached<true>(near, size, radius, blocks, [&](int b, const Chosen& chosen) HWY_ATTR {
+  ForEachReached<true>(near, radius, blocks, [&](int b, const Chosen& chosen) HWY_ATTR {
     AddGrains(chosen.along.data(), chosen.across.data(), chosen.size.data(), chosen.count, spacing,
               distances.blocks[b]);
   });
 }
 
-void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
+void AddNearMoments(const ParticleBlock& near, bool has_sizes, float radius,
                     const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {
-  const auto add = size != nullptr ? AddNearMomentsOf<true> : AddNearMomentsOf<false>;
-  add(near, size, radius, blocks, has_kernel_sums, sums);
+  const auto add = has_sizes ? AddNearMomentsOf<true> : AddNearMomentsOf<false>;
+  add(near, radius, blocks, has_kernel_sums, sums);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -187,14 +184,14 @@ namespace partiemc {
 HWY_EXPORT(AddNearGrains);
 HWY_EXPORT(AddNearMoments);
 
-void AddNearGrains(const ParticleBlock& near, const float* size, const Scale& scale,
-                   const NodeBlocks& blocks, GrainDistances& distances) {
-  HWY_DYNAMIC_DISPATCH(AddNearGrains)(near, size, scale, blocks, distances);
+void AddNearGrains(const ParticleBlock& near, const Scale& scale, const NodeBlocks& blocks,
+                   GrainDistances& distances) {
+  HWY_DYNAMIC_DISPATCH(AddNearGrains)(near, scale, blocks, distances);
 }
 
-void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
+void AddNearMoments(const ParticleBlock& near, bool has_sizes, float radius,
                     const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums) {
-  HWY_DYNAMIC_DISPATCH(AddNearMoments)(near, size, radius, blocks, has_kernel_sums, sums);
+  HWY_DYNAMIC_DISPATCH(AddNearMoments)(near, has_sizes, radius, blocks, has_kernel_sums, sums);
 }
 
 NodeBlocks BlocksOf(const BitRows& asked) {

@@ -235,11 +235,10 @@ void ScatterNearKernelsOf(const ParticleBlock& near, const float* weight, float 
   }
 }
 
-void ScatterNearSizedKernels(const ParticleBlock& near, const float* size, float radius,
-                             NodeSums& sums) {
+void ScatterNearSizedKernels(const ParticleBlock& near, float radius, NodeSums& sums) {
   for (int p = 0; p < near.count; ++p) {
     const float x = near.x[p], y = near.y[p];
-    const float reach = radius * size[near.particle[p]];
+    const float reach = radius * near.size[p];
     const KernelNodes at(x, y, reach, 0, kTileSize);
     if (at.columns <= 0 || at.rows <= 0) continue;
     AddAtNodes<false>(x, y, at, 1 / (reach * reach), 1, sums);
@@ -272,9 +271,8 @@ void ScatterNearKernels(const ParticleBlock& near, const float* weight, float ra
   HWY_DYNAMIC_DISPATCH(ScatterNearKernels)(near, weight, radius, sums);
 }
 
-void ScatterNearSizedKernels(const ParticleBlock& near, const float* size, float radius,
-                             NodeSums& sums) {
-  HWY_DYNAMIC_DISPATCH(ScatterNearSizedKernels)(near, size, radius, sums);
+void ScatterNearSizedKernels(const ParticleBlock& near, float radius, NodeSums& sums) {
+  HWY_DYNAMIC_DISPATCH(ScatterNearSizedKernels)(near, radius, sums);
 }
 
 }  // namespace partiemc

@@ -98,19 +98,18 @@ void ScatterKernels(const TileParticles& tile, float radius, NodeSums& sums);
 void ScatterNearKernels(const ParticleBlock& near, const float* weight, float radius,
                         NodeSums& sums);
 
-/// As ScatterNearKernels, for particles of different sizes. `size`: by particle of the bins.
-void ScatterNearSizedKernels(const ParticleBlock& near, const float* size, float radius,
-                             NodeSums& sums);
+/// As ScatterNearKernels, for particles of different sizes.
+void ScatterNearSizedKernels(const ParticleBlock& near, float radius, NodeSums& sums);
 
-/// Adds particles, in their order, to the moments of blocks. `size`: by particle of the bins, null
-/// if sizes are equal. `has_kernel_sums`: sum k is known, so it is not added.
-void AddNearMoments(const ParticleBlock& near, const float* size, float radius,
+/// Adds particles, in their order, to the moments of blocks. `has_sizes`: sizes differ.
+/// `has_kernel_sums`: sum k is known, so it is not added.
+void AddNearMoments(const ParticleBlock& near, bool has_sizes, float radius,
                     const NodeBlocks& blocks, bool has_kernel_sums, MomentSums& sums);
 
 /// Lowers `distances` to the distances from these grains, if they are nearer. Grains whose kernels
-/// do not reach a node may be left out. `size`: by particle of the bins.
-void AddNearGrains(const ParticleBlock& near, const float* size, const Scale& scale,
-                   const NodeBlocks& blocks, GrainDistances& distances);
+/// do not reach a node may be left out.
+void AddNearGrains(const ParticleBlock& near, const Scale& scale, const NodeBlocks& blocks,
+                   GrainDistances& distances);
 
 /// Classifies the nodes of a tile by the density f = weight * sum. Sets `inside`, and `open` for
 /// undecided nodes. Replaces the sums of decided nodes by the term of F that decides, or by F
