@@ -4,7 +4,11 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <string>
 #include <string_view>
+#include <vector>
+
+#include "absl/strings/str_split.h"
 
 namespace partiemc::server {
 namespace {
@@ -41,13 +45,13 @@ void ForEachGroup(const std::string& root, std::string_view controller, Visit vi
     const auto first = line.find(':');
     const auto second = first == std::string::npos ? first : line.find(':', first + 1);
     if (second == std::string::npos) continue;
-    const std::string controllers = line.substr(first + 1, second - first - 1);
+    const std::vector<std::string> controllers =
+        absl::StrSplit(line.substr(first + 1, second - first - 1), ',', absl::SkipEmpty());
     const std::string group = line.substr(second + 1);
     const std::string top = root + "/sys/fs/cgroup";
     if (controllers.empty()) {
       ForEachFolder(top, group, [&](const std::string& folder) { visit(2, folder); });
-    } else if (("," + controllers + ",").find("," + std::string(controller) + ",") !=
-               std::string::npos) {
+    } else if (std::ranges::find(controllers, controller) != controllers.end()) {
       ForEachFolder(top + "/" + std::string(controller), group,
                     [&](const std::string& folder) { visit(1, folder); });
     }

@@ -36,7 +36,7 @@ std::vector<double> Reversed(const std::vector<double>& ring) {
 // are up to date.
 Rings Repaired(const Rings& roots, Rings rings) {
   RepairScratch scratch;
-  EXPECT_TRUE(RepairRings(roots.points, Retreat::kHalfWay, scratch, rings));
+  EXPECT_TRUE(RepairRings(roots.points, {}, scratch, rings));
   EXPECT_EQ(CountTouchingPairs(rings.points, rings.offsets, scratch.pairs), 0u);
   EXPECT_EQ(rings.measures.size(), rings.RingCount());
   for (std::size_t ring = 0; ring < rings.measures.size(); ++ring) {
@@ -128,11 +128,11 @@ TEST(Repair, FailsIfRingsCrossAtTheirRoots) {
   RepairScratch scratch;
   for (const Rings& roots : crossing) {
     Rings rings = roots;
-    EXPECT_FALSE(RepairRings(roots.points, Retreat::kHalfWay, scratch, rings));
+    EXPECT_FALSE(RepairRings(roots.points, {}, scratch, rings));
     EXPECT_EQ(rings.points, roots.points);
   }
   Rings rings = RingsOf({Square(0, 0, 1)}, 1);
-  EXPECT_TRUE(RepairRings(std::vector(rings.points), Retreat::kHalfWay, scratch, rings))
+  EXPECT_TRUE(RepairRings(std::vector(rings.points), {}, scratch, rings))
       << "with the same scratch";
 }
 
@@ -140,7 +140,7 @@ TEST(Repair, FailsIfARingIsMisplacedAtItsRoot) {
   const Rings roots = RingsOf({Square(0, 0, 5), Square(0, 0, 1)}, 2);
   Rings rings = roots;
   RepairScratch scratch;
-  EXPECT_FALSE(RepairRings(roots.points, Retreat::kHalfWay, scratch, rings));
+  EXPECT_FALSE(RepairRings(roots.points, {}, scratch, rings));
 }
 
 TEST(Repair, SeparatesCoincidentPoints) {

@@ -149,6 +149,19 @@ TEST(Walls, FluidAboveAWallDoesNotTouchIt) {
   EXPECT_TRUE(rings.contacts.empty());
 }
 
+// Also in frames whose rings need repair.
+TEST(Walls, FarWallsKeepTheBits) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(200u); ++seed) {
+    const Particles particles = support::RandomScene(seed);
+    double low = 0;
+    for (std::size_t k = 0; k < particles.size(); ++k) low = std::min(low, particles.y(k));
+    ReconstructionParameters parameters{.spacing = 1.0};
+    const Rings free = ReconstructOnce(parameters, particles).rings;
+    parameters.walls = {{{-10, low - 50, 10, low - 50}}};
+    EXPECT_EQ(ReconstructOnce(parameters, particles).rings, free) << "seed " << seed;
+  }
+}
+
 TEST(Walls, ResultsKeepTheGuaranteesInRandomFrames) {
   std::size_t wetted = 0, off = 0, contacts = 0, beyond = 0, points = 0;
   double farthest = 0, deepest = 0;

@@ -24,6 +24,7 @@ struct Outline {
 
 struct Repair {
   std::span<const double> roots;
+  std::span<const std::uint8_t> near_walls;
   PhaseRepairScratch& s;
   std::span<double> points;
   bool has_touching = false, has_misplaced = false;
@@ -82,7 +83,8 @@ struct Repair {
     bool has_moved = false;
     for (std::size_t k = 0; k < points.size(); ++k) {
       if (!s.is_marked[k / 2] || points[k] == roots[k]) continue;
-      points[k] = all_the_way ? roots[k] : (points[k] + roots[k]) / 2;
+      const bool goes_back = all_the_way || (!near_walls.empty() && near_walls[k / 2] != 0);
+      points[k] = goes_back ? roots[k] : (points[k] + roots[k]) / 2;
       has_moved = true;
     }
     return has_moved;
@@ -92,8 +94,8 @@ struct Repair {
 }  // namespace
 
 bool RepairPhases(const Rings& body, std::span<const PhaseRings> phases,
-                  std::span<const double> roots, Retreat retreat, PhaseRepairScratch& scratch,
-                  std::span<double> points) {
+                  std::span<const double> roots, std::span<const std::uint8_t> near_walls,
+                  PhaseRepairScratch& scratch, std::span<double> points) {
   const auto for_each_outline = [&](auto visit) {
     visit(Outline{{}, body.offsets, body.outer_of});
     for (const PhaseRings& phase : phases) {
@@ -102,15 +104,14 @@ bool RepairPhases(const Rings& body, std::span<const PhaseRings> phases,
   };
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
-    Repair repair{roots, scratch, points};
+    Repair repair{roots, near_walls, scratch, points};
     scratch.is_marked.assign(points.size() / 2, 0);
     for_each_outline([&](const Outline& outline) { repair.MarkTouching(outline); });
     if (!repair.has_touching) {
       for_each_outline([&](const Outline& outline) { repair.MarkMisplaced(outline); });
       if (!repair.has_misplaced) return true;
     }
-    const bool all_the_way =
-        repair.has_misplaced || retreat == Retreat::kAllTheWay || round >= kHalfWayRounds;
+    const bool all_the_way = repair.has_misplaced || round >= kHalfWayRounds;
     if (round < kMostRounds && repair.MovePoints(all_the_way)) continue;
     std::ranges::fill(scratch.is_marked, std::uint8_t{1});
     if (!repair.MovePoints(true)) return false;

@@ -26,13 +26,14 @@ struct PhaseRepairScratch {
 /// overlap, and none leaves the body (core/PHASES.md, "Why phases do not overlap").
 ///
 /// In each round, the ends of touching segments and their neighbours return half way, from the
-/// fifth round on, or if `retreat` says so, all the way. If no segments touch, an outline with
+/// fifth round on, and near walls, all the way. If no segments touch, an outline with
 /// misplaced rings returns as a whole. After 24 rounds all points return. `points`, `roots`: by
 /// shared point, interleaved, in world units. Returns false if outlines are not valid with all
 /// points at their roots, which is a bug. Cost: for each round and outline as CountTouchingPairs
 /// and RingDepths.
 [[nodiscard]] bool RepairPhases(const Rings& body, std::span<const PhaseRings> phases,
-                                std::span<const double> roots, Retreat retreat,
+                                std::span<const double> roots,
+                                std::span<const std::uint8_t> near_walls,
                                 PhaseRepairScratch& scratch, std::span<double> points);
 
 }  // namespace partiemc

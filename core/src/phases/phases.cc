@@ -107,6 +107,17 @@ void KeepBodyOffWalls(const PhaseInput& input, Phases& p) {
   }
 }
 
+void FindPointsNearWalls(const PhaseInput& input, Phases& p) {
+  p.near_walls = input.vertices.near_walls;
+  if (p.walls == nullptr) return;
+  const auto add = [&](const auto& place) {
+    const float height = input.walls.HeightAt({place.tile, place.i, place.j});
+    p.near_walls.push_back(height < WallField::kMostHeight ? 1 : 0);
+  };
+  for (const PhaseEdge& edge : p.map.edges) add(edge);
+  for (const PhaseCell& cell : p.map.cells) add(cell);
+}
+
 // The angle of a phase at point k of its ring, if interfaces end there or the outline of the body
 // meets a wall. `spacing`: world units.
 std::optional<float> AngleOf(const Phases& p, std::span<const std::uint32_t> ring, std::size_t k,
@@ -191,8 +202,8 @@ bool PlacePhases(const PhaseInput& input, const PlacedVertices& placed, Phases& 
   p.is_junction.assign(p.points.position.size(), 0);
   for (const ArcEnd& end : p.junctions.ends) p.is_junction[end.junction] = 1;
   ToWorld(placed, body, input.scale.cell_size, p);
-  const Retreat retreat = input.vertices.HowToReturn();
-  if (!RepairPhases(body, p.rings, p.world_roots, retreat, p.repair, p.world)) return false;
+  FindPointsNearWalls(input, p);
+  if (!RepairPhases(body, p.rings, p.world_roots, p.near_walls, p.repair, p.world)) return false;
   std::copy_n(p.world.begin(), body.points.size(), body.points.begin());
   for (std::size_t k = 0; k < body.PointCount(); ++k) {
     if (p.junctions.has_moved[k] == 0) continue;

@@ -44,6 +44,7 @@ struct Phases {
   /// By point of the body: the next point of its ring, if the ring runs along a wall to it; else
   /// PhaseArc::kNoEnd. Empty without walls.
   std::vector<std::uint32_t> wet_next;
+  std::vector<std::uint8_t> near_walls;  ///< By shared point: 1 near a wall; empty without walls.
   PhaseAreaScratch areas;
   PhaseRepairScratch repair;
 };

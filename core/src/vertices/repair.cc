@@ -94,12 +94,13 @@ void MarkMisplacedRings(const Rings& rings, RepairScratch& scratch) {
 }
 
 // Moves the marked points towards their roots; returns whether any point moved.
-bool MovePoints(std::span<const double> roots, bool all_the_way, const RepairScratch& scratch,
-                Rings& rings) {
+bool MovePoints(std::span<const double> roots, std::span<const std::uint8_t> near_walls,
+                bool all_the_way, const RepairScratch& scratch, Rings& rings) {
   bool has_moved = false;
   for (std::size_t k = 0; k < rings.points.size(); ++k) {
     if (!scratch.is_marked[k / 2] || rings.points[k] == roots[k]) continue;
-    rings.points[k] = all_the_way ? roots[k] : (rings.points[k] + roots[k]) / 2;
+    const bool goes_back = all_the_way || (!near_walls.empty() && near_walls[k / 2] != 0);
+    rings.points[k] = goes_back ? roots[k] : (rings.points[k] + roots[k]) / 2;
     has_moved = true;
   }
   return has_moved;
@@ -107,13 +108,13 @@ bool MovePoints(std::span<const double> roots, bool all_the_way, const RepairScr
 
 }  // namespace
 
-bool RepairRings(std::span<const double> roots, Retreat retreat, RepairScratch& scratch,
-                 Rings& rings) {
+bool RepairRings(std::span<const double> roots, std::span<const std::uint8_t> near_walls,
+                 RepairScratch& scratch, Rings& rings) {
   for (int round = 0;; ++round) {
     ThrowIfCancelled();
     const std::size_t touching = CountTouchingPairs(rings.points, rings.offsets, scratch.pairs);
     scratch.is_marked.assign(rings.PointCount(), 0);
-    bool all_the_way = retreat == Retreat::kAllTheWay || round >= kHalfWayRounds;
+    bool all_the_way = round >= kHalfWayRounds;
     if (touching > 0) {
       for (const auto& [first, second] : scratch.pairs.pairs) {
         MarkSegment(rings, first, scratch.is_marked);
@@ -126,11 +127,11 @@ bool RepairRings(std::span<const double> roots, Retreat retreat, RepairScratch& 
       MarkMisplacedRings(rings, scratch);
       all_the_way = true;
     }
-    if (round < kMostRounds && MovePoints(roots, all_the_way, scratch, rings)) continue;
+    if (round < kMostRounds && MovePoints(roots, near_walls, all_the_way, scratch, rings)) continue;
     // All points return. Either the rounds are used up, or every marked point is at its root
     // already, so an unmarked point must move.
     std::fill(scratch.is_marked.begin(), scratch.is_marked.end(), std::uint8_t{1});
-    if (!MovePoints(roots, true, scratch, rings)) return false;
+    if (!MovePoints(roots, near_walls, true, scratch, rings)) return false;
   }
 }
 

@@ -11,11 +11,7 @@
 
 namespace partiemc {
 
-/// How points return to their roots in the first four rounds of a repair; later all the way.
-enum class Retreat {
-  kHalfWay,
-  kAllTheWay,  ///< At walls: half way along a bent wall may be behind it, roots are not.
-};
+/// In this number of rounds of a repair, points return only half way to their roots.
 inline constexpr int kHalfWayRounds = 4;
 
 /// Warm buffers of RepairRings.
@@ -32,7 +28,8 @@ struct RepairScratch {
 /// the rings, interleaved, in world units.
 ///
 /// If segments cross or touch, a round moves their ends, and the points next to these, half way
-/// back; from the fifth round on, or if `retreat` says so, all the way. Without such segments,
+/// back; from the fifth round on all the way. Points near walls return all the way at once, because
+/// half way along a bent wall may be behind it. Without such segments,
 /// misplaced rings return as a whole, with the rings that may surround them; all rings return if
 /// more than 100 are misplaced. A ring is misplaced if it is turned inside out, or if another ring
 /// has passed over it. Ordinary frames need no round. After 24 rounds, or if a round would move no
@@ -42,9 +39,12 @@ struct RepairScratch {
 /// because rings through the roots are simple and nested (core/METHOD.md, "Why rings are simple";
 /// tests/core/roots_test.cc).
 ///
+/// `near_walls`: by point, 1 near a wall; empty without walls.
+///
 /// Measures the rings (measure.h) unless it fails. Throws Cancelled (base/cancellation.h).
 /// Cost: for each round near-linear in the points, n log n in local minima and maxima of the rings.
-[[nodiscard]] bool RepairRings(std::span<const double> roots, Retreat retreat,
-                               RepairScratch& scratch, Rings& rings);
+[[nodiscard]] bool RepairRings(std::span<const double> roots,
+                               std::span<const std::uint8_t> near_walls, RepairScratch& scratch,
+                               Rings& rings);
 
 }  // namespace partiemc

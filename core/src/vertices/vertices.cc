@@ -13,6 +13,7 @@
 #include "vertices/intersections.h"
 #include "vertices/measure.h"
 #include "vertices/placement.h"
+#include "vertices/thinning.h"
 #include "vertices/virtual_plane.h"
 #include "vertices/volume_correction.h"
 
@@ -120,12 +121,11 @@ bool AppendRing(const VertexInput& input, std::size_t ring, int per_segment,
   return keep;
 }
 
-// Places the rings of `virtual-plane`: moves vertices, matches the area and repairs the rings.
+// Makes rings of the kept vertices of `virtual-plane`, matches the area and repairs the rings.
 // Returns false if the repair failed.
-bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
-                       VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
-  RingVertices& vertices = scratch.vertices;
-  PlaceOnVirtualPlanes(input, vertices);
+bool JoinKeptVertices(const VertexInput& input, std::optional<double>& area_offset,
+                      VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
+  const RingVertices& vertices = scratch.vertices;
   const RingTopology& topology = input.topology;
   const double cell_size = input.scale.cell_size;
   std::uint32_t count = 0;
@@ -141,20 +141,25 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   const bool meets_walls = has_walls && std::ranges::any_of(vertices.meets_wall, std::identity());
   scratch.sizes.resize(input.scale.has_own_sizes ? count : 0);
   scratch.offset_factors.resize(meets_walls ? count : 0);
+  scratch.near_walls.resize(has_walls ? count : 0);
   if (has_walls) scratch.walls.Resize(count);
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     std::size_t point = rings.offsets[ring];
     for (std::size_t i = 2 * std::size_t{topology.offsets[ring]};
          i < 2 * std::size_t{topology.offsets[ring + 1]}; ++i) {
+      placed.point_of_segment[i / 2] = kNoPoint;
       if (!vertices.is_kept[i]) continue;
-      // The cell vertex comes after the edge vertex and is always kept, so its index remains.
+      // The cell vertex comes after the edge vertex, so its index remains.
       placed.point_of_segment[i / 2] = static_cast<std::uint32_t>(point);
       Store(vertices.point[i], cell_size, &rings.points[2 * point]);
       Store(vertices.root[i], cell_size, &placed.roots[2 * point]);
       rings.normals[2 * point] = vertices.normal[i].x;
       rings.normals[2 * point + 1] = vertices.normal[i].y;
       if (!vertices.size.empty()) scratch.sizes[point] = vertices.size[i];
-      if (has_walls) scratch.walls.Copy(vertices.walls, i, point);
+      if (has_walls) {
+        scratch.walls.Copy(vertices.walls, i, point);
+        scratch.near_walls[point] = vertices.walls.tile[i] != kNoTile ? 1 : 0;
+      }
       if (meets_walls) {
         const bool is_free = vertices.walls.kind[i] == VertexKind::kFree;
         scratch.offset_factors[point] = is_free ? static_cast<float>(vertices.SizeOf(i)) : 0;
@@ -172,7 +177,20 @@ bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_off
   if (meets_walls) ListContacts(scratch.walls, rings);
   SnapToAxes(cell_size, rings.points);
   SnapToAxes(cell_size, placed.roots);
-  return RepairRings(placed.roots, scratch.HowToReturn(), scratch.repair, rings);
+  return RepairRings(placed.roots, scratch.near_walls, scratch.repair, rings);
+}
+
+// Places the rings of `virtual-plane`. Rings are certainly simple only with a vertex in each cell:
+// if the repair fails without some, they return. Returns false if it fails with all of them.
+bool PlaceRefinedRings(const VertexInput& input, std::optional<double>& area_offset,
+                       VertexScratch& scratch, PlacedVertices& placed, Rings& rings) {
+  PlaceOnVirtualPlanes(input, scratch.vertices);
+  const std::optional<double> last_offset = area_offset;
+  if (JoinKeptVertices(input, area_offset, scratch, placed, rings)) return true;
+  if (!KeepCellVertices(scratch.vertices)) return false;
+  area_offset = last_offset;
+  rings.Clear();
+  return JoinKeptVertices(input, area_offset, scratch, placed, rings);
 }
 
 // Places the rings of all placements except `virtual-plane`, segment by segment.

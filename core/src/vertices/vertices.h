@@ -21,7 +21,7 @@ namespace partiemc {
 
 struct VirtualPlaneVariant;  // core/internal/research.h
 
-/// Value of PlacedVertices::point_of_segment for a segment whose ring was dropped.
+/// Value of PlacedVertices::point_of_segment for a segment whose ring or vertex was dropped.
 inline constexpr std::uint32_t kNoPoint = 0xffffffff;
 
 /// Maps rings and segments of RingTopology to rings and points of Rings.
@@ -87,14 +87,14 @@ struct VertexScratch {
   RingVertices vertices;       ///< `virtual-plane` only.
   WallVertices walls;          ///< By point of the rings, if there are walls.
   bool has_walls = false;
-  std::vector<float> sizes;           ///< By point: the local size; empty for equal sizes.
-  std::vector<float> offset_factors;  ///< By point, if rings meet walls (PointSizes::factors).
-  std::vector<double> offset_points;  ///< Scratch of CorrectVolume.
+  std::vector<std::uint8_t> near_walls;  ///< By point: 1 near a wall; empty without walls.
+  std::vector<float> sizes;              ///< By point: the local size; empty for equal sizes.
+  std::vector<float> offset_factors;     ///< By point, if rings meet walls (PointSizes::factors).
+  std::vector<double> offset_points;     ///< Scratch of CorrectVolume.
   RepairScratch repair;
 
   /// By point of the rings; null without walls.
   const WallVertices* WallPoints() const { return has_walls ? &walls : nullptr; }
-  Retreat HowToReturn() const { return has_walls ? Retreat::kAllTheWay : Retreat::kHalfWay; }
 };
 
 /// The frame, the parameters and the results of the earlier stages.

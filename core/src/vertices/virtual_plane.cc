@@ -15,6 +15,7 @@
 #include "vertices/plane_support.h"
 #include "vertices/ring_filters.h"
 #include "vertices/stretches.h"
+#include "vertices/thinning.h"
 
 namespace partiemc {
 namespace {
@@ -410,24 +411,6 @@ void RefineStretches(const VertexInput& input, RingVertices& v) {
   }
 }
 
-// Drops edge vertices that lie nearly on the chord of the neighbouring cell vertices.
-void Thin(const VertexInput& input, std::size_t ring, RingVertices& v) {
-  const double min_distance = input.variant.constants.thinning_distance * input.scale.spacing;
-  const std::size_t first = 2 * std::size_t{input.topology.offsets[ring]};
-  const std::size_t last = 2 * std::size_t{input.topology.offsets[ring + 1]};
-  for (std::size_t k = first; k < last; k += 2) {
-    const Point& a = v.point[(k == first ? last : k) - 1];
-    const Point& p = v.point[k];
-    const Point& b = v.point[k + 1];
-    const Point chord{b.x - a.x, b.y - a.y};
-    const double cross = chord.x * (p.y - a.y) - chord.y * (p.x - a.x);
-    // At a corner of walls, vertices may coincide.
-    v.is_kept[k] = input.variant.steps.edge_vertices && p != a && p != b &&
-                   std::abs(cross) >= min_distance * v.SizeOf(k) * std::sqrt(Dot(chord, chord));
-    v.is_kept[k + 1] = 1;
-  }
-}
-
 // Step 1 for a ring.
 void FindRingRoots(const VertexInput& input, std::size_t ring, RingVertices& v) {
   const std::size_t begin = input.topology.offsets[ring];
@@ -474,18 +457,18 @@ void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices) {
       ShortRing memory;
       RefineRing(input, ring, memory.Of(size), vertices);
     }
-    Thin(input, ring, vertices);
+    ThinRing(input, ring, vertices);
   });
   periodic.Allocate();
   ParallelFor(topology.RingCount(), [&](std::size_t ring) {
     if (periodic.sizes()[ring].count == 0) return;
     RefineRing(input, ring, periodic[ring], vertices);
-    Thin(input, ring, vertices);
+    ThinRing(input, ring, vertices);
   });
   if (input.walls == nullptr) return;
   RefineStretches(input, vertices);
   for (std::size_t ring = 0; ring < topology.RingCount(); ++ring) {
-    if (vertices.meets_wall[ring] != 0) Thin(input, ring, vertices);
+    if (vertices.meets_wall[ring] != 0) ThinRing(input, ring, vertices);
   }
 }
 

@@ -10,8 +10,8 @@ namespace partiemc {
 /// The middle itself if the gradient is weak. In cells from the origin of the world.
 Point VirtualPlaneVertex(const CellPlane& plane, double max_step);
 
-/// Runs steps 1 to 3 of the default placement (roots, normals, planes), and thinning, which drops
-/// edge vertices on nearly straight parts. Deterministic. Parallel over rings and parts of long
+/// Runs steps 1 to 3 of the default placement (roots, normals, planes), and thinning (thinning.h).
+/// Deterministic. Parallel over rings and parts of long
 /// rings; stretches between walls follow one after another. Cost: for each vertex, a few field
 /// samples and windows of about twenty vertices.
 void PlaceOnVirtualPlanes(const VertexInput& input, RingVertices& vertices);

@@ -123,13 +123,27 @@ class WallVertexFinder {
     const std::optional<WallPlace> place =
         is_near ? FindWall(cell.tile, edge) : std::optional<WallPlace>();
     v_.walls.is_wet[vertex] = place.has_value();
-    if (!place) return;
+    if (!place) {
+      KeepAnchorOffWalls(cell, edge.from, v_.root[vertex]);
+      return;
+    }
     SetWall(vertex, *place, VertexKind::kWall);
     // The anchor stays on the lattice edge, away from its nodes.
     const Point &a = edge.from, &b = edge.to, &at = v_.point[vertex];
     const double share = std::clamp((at.x - a.x) * (b.x - a.x) + (at.y - a.y) * (b.y - a.y),
                                     kEdgeMargin, 1 - kEdgeMargin);
     v_.root[vertex] = {a.x + share * (b.x - a.x), a.y + share * (b.y - a.y)};
+  }
+
+  // Moves an anchor on an edge that is behind a wall towards the inside node of the edge.
+  void KeepAnchorOffWalls(const ActiveCell& cell, const Point& inside, Point& anchor) const {
+    constexpr int kMostSteps = 4;
+    if (!IsNearWall(cell)) return;
+    for (int step = 0; step < kMostSteps && IsBehindWall(cell.tile, anchor); ++step) {
+      const Point half = Times(Plus(anchor, inside), .5);
+      if (Length(Minus(half, inside)) < kEdgeMargin) return;
+      anchor = half;
+    }
   }
 
   void FindCell(std::size_t segment, std::size_t next) {

@@ -17,8 +17,9 @@ namespace {
 constexpr double kMostReach = 3.5;
 // In corners this factor lengthens the reach, because the field rounds a corner of the fluid.
 constexpr double kCornerReach = 1.5;
-// The cosines of the turn between the walls of corners of 150 and of 30 degrees.
-constexpr double kFlatCorner = .867, kSharpCorner = -.867;
+// The point above a corner is at most this far from the wall below the node, in cells, because
+// walls far from the tile are not known.
+constexpr double kFarthestPoint = 12;
 // The nodes around a point on a wall are at most this far from the wall, in cells.
 constexpr float kBeside = 1.5F;
 // Nodes deeper in the solid than this, in cells, need no value of the fluid: no lattice edge joins
@@ -381,20 +382,18 @@ double WallField::SizeAt(const TileDirectory& directory, std::uint32_t tile,
 }
 
 // The point at the height `reach` above both walls of a corner, if a node is nearer to both.
-// `floor_place`: the place on the walls that is nearest to the node.
-std::optional<Point> WallField::AboveCorner(std::uint32_t tile, const WallPlace& floor_place,
+// `floor`: the place on the walls that is nearest to the node.
+std::optional<Point> WallField::AboveCorner(std::uint32_t tile, const WallPlace& floor,
                                             double reach) const {
-  const WallEdge& floor = lines_.edges()[floor_place.edge];
-  const Point above_floor = Plus(lines_.At(floor_place), Times(floor.Left(), reach));
+  const Point foot = lines_.At(floor), left = lines_.edges()[floor.edge].Left();
   const auto is_below = [&](const NearestWall& wall) { return wall.height < .99 * reach; };
-  const NearestWall nearest = Nearest(tile, above_floor);
-  if (!is_below(nearest)) return std::nullopt;
-  const WallEdge& side = lines_.edges()[nearest.place.edge];
-  const double cosine = Dot(floor.Left(), side.Left());
-  if (cosine > kFlatCorner || cosine < kSharpCorner) return std::nullopt;
-  const double missing = reach - Dot(Minus(above_floor, side.from), side.Left());
-  const Point above = Plus(above_floor, Times(floor.unit, missing / Dot(floor.unit, side.Left())));
-  return is_below(Nearest(tile, above)) ? std::nullopt : std::optional(above);
+  const NearestWall side = Nearest(tile, Plus(foot, Times(left, reach)));
+  if (!is_below(side)) return std::nullopt;
+  const std::optional<Point> above = lines_.AboveCorner(floor.edge, side.place.edge, reach);
+  if (!above || Length(Minus(*above, foot)) > kFarthestPoint || is_below(Nearest(tile, *above))) {
+    return std::nullopt;
+  }
+  return above;
 }
 
 void WallField::ExtendFluid(const TileDirectory& directory, const Scale& scale,

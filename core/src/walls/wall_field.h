@@ -106,8 +106,7 @@ class WallField {
   void CollectCrossings(std::int32_t row);
   void SetTile(const TileDirectory& directory, std::uint32_t tile);
   void MeasureHeights(const TileDirectory& directory, NearTile& near) const;
-  std::optional<Point> AboveCorner(std::uint32_t tile, const WallPlace& floor_place,
-                                   double reach) const;
+  std::optional<Point> AboveCorner(std::uint32_t tile, const WallPlace& floor, double reach) const;
   void ExtendFluid(const TileDirectory& directory, const Scale& scale, const LevelSet& level_set,
                    NearTile& near) const;
 

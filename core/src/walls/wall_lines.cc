@@ -247,6 +247,25 @@ NearestWall WallLines::NearestAlong(const WallPlace& place, double reach,
   return choice.best();
 }
 
+std::optional<Point> WallLines::AboveCorner(std::uint32_t floor, std::uint32_t side,
+                                            double height) const {
+  // The cosines of the turn in corners of 150 and of 30 degrees.
+  constexpr double kFlat = .867, kSharp = -.867;
+  constexpr double kJoint = .05;  // Lines may end this far before their crossing, in cells.
+  const WallEdge &a = edges_[floor], &b = edges_[side];
+  const double cosine = Dot(a.unit, b.unit), sine = Cross(a.unit, b.unit);
+  if (cosine > kFlat || cosine < kSharp) return std::nullopt;
+  const Point between = Minus(b.from, a.from);
+  const double on_a = Cross(between, b.unit) / sine, on_b = Cross(between, a.unit) / sine;
+  const auto ends_at = [](const WallEdge& edge, double at) {
+    return edge.is_endless || (at > -kJoint && at < edge.length + kJoint);
+  };
+  if (!ends_at(a, on_a) || !ends_at(b, on_b)) return std::nullopt;
+  // On the bisector: both heights of the crossing plus t (left_a + left_b) are t (1 + cosine).
+  const Point crossing = Plus(a.from, Times(a.unit, on_a));
+  return Plus(crossing, Times(Plus(a.Left(), b.Left()), height / (1 + cosine)));
+}
+
 bool WallLines::IsBehindEndless(std::size_t solid, const Point& point) const {
   const WallEdge& line = edges_[solids_[solid].first];
   return Cross(line.unit, Minus(point, line.from)) <= 0;

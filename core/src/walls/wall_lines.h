@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -101,6 +102,10 @@ class WallLines {
   /// The place nearest to `point` on the part of a loop within `reach` cells of `place`, measured
   /// along the loop, with ties as in Nearest. Cost: linear in the lines of this part.
   NearestWall NearestAlong(const WallPlace& place, double reach, const Point& point) const;
+
+  /// The point `height` above both lines, in cells, if they are the walls of a corner of 30 to 150
+  /// degrees: if the fluid is between them, and they meet, or end just before.
+  std::optional<Point> AboveCorner(std::uint32_t floor, std::uint32_t side, double height) const;
 
   /// Whether a point is in the solid of an endless line, or on the line.
   bool IsBehindEndless(std::size_t solid, const Point& point) const;
