@@ -224,6 +224,7 @@ void PinToWalls(const VertexInput& input, std::span<const float> sizes, const Wa
   const WallField& walls = *input.walls;
   const double cell_size = input.scale.cell_size;
   for (std::size_t k = 0; k < rings.PointCount(); ++k) {
+    if (points.kind[k] == VertexKind::kFixed) continue;
     double* const target = &rings.points[2 * k];
     if (points.kind[k] != VertexKind::kFree) {
       const Point at = walls.lines().InWorld(points.place[k]);

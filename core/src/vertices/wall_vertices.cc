@@ -49,6 +49,7 @@ class WallVertexFinder {
     if (meets_wall) {
       WetShortStretches(2 * first, 2 * last);
       MoveToCorners(2 * first, 2 * last);
+      if (IsFlat(2 * first, 2 * last)) FixAtAnchors(2 * first, 2 * last);
     }
     return meets_wall;
   }
@@ -262,6 +263,27 @@ class WallVertexFinder {
         SetWall(at(k), walls_.Nearest(v_.walls.tile[at(k)], v_.point[at(k)]).place,
                 VertexKind::kWall);
       }
+    }
+  }
+
+  // Whether a ring has nearly no area: all its vertices may lie on one line of a wall. Rounding
+  // would then decide whether it is turned inside out.
+  bool IsFlat(std::size_t first, std::size_t last) const {
+    constexpr double kLeastArea = 1e-4;  // In cells.
+    double twice = 0;
+    for (std::size_t k = first; k < last; ++k) {
+      const Point& next = v_.point[k + 1 < last ? k + 1 : first];
+      twice += Cross(Minus(v_.point[k], v_.point[first]), Minus(next, v_.point[first]));
+    }
+    return std::abs(twice) < 2 * kLeastArea;
+  }
+
+  // Returns the vertices of a ring to their anchors, off the walls.
+  void FixAtAnchors(std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      v_.walls.kind[k] = VertexKind::kFixed;
+      v_.walls.is_wet[k] = 0;
+      v_.point[k] = v_.root[k];
     }
   }
 

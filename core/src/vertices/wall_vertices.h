@@ -16,13 +16,14 @@ enum class VertexKind : std::uint8_t {
   kFree,
   kWall,     ///< On a wall.
   kContact,  ///< On a wall, where a free stretch of the ring ends.
+  kFixed,    ///< At its anchor, off the walls.
 };
 
 /// How the vertices of RingVertices, or the points of Rings, relate to walls. Arrays by vertex or
 /// point; unused without walls.
 struct WallVertices {
   std::vector<VertexKind> kind;
-  std::vector<WallPlace> place;  ///< On the wall; not set for kFree.
+  std::vector<WallPlace> place;  ///< On the wall, or near it for kFixed; not set for kFree.
   /// Whether the ring runs along a wall from this vertex to the next.
   std::vector<std::uint8_t> is_wet;
   /// Tile of the vertex's cell if a wall is near the vertex, else kNoTile.
