@@ -44,10 +44,11 @@ Particles LargeDisc(double radius, double size) {
   return particles;
 }
 
+// The distance of a point from an outline of one ring.
 double DistanceFromOutline(const Rings& rings, double x, double y) {
   double nearest = 1e300;
   for (std::size_t k = 0; k < rings.PointCount(); ++k) {
-    const std::size_t next = k + 1 < rings.PointCount() ? k + 1 : 0;  // Of the only ring.
+    const std::size_t next = k + 1 < rings.PointCount() ? k + 1 : 0;
     const double ax = rings.points[2 * k], ay = rings.points[2 * k + 1];
     const double dx = rings.points[2 * next] - ax, dy = rings.points[2 * next + 1] - ay;
     const double share = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy);

@@ -10,12 +10,12 @@ namespace partiemc {
 /// Sets `vertices.is_kept` of the vertices of a ring.
 ///
 /// Drops edge vertices that lie nearly on the chord of the neighbouring cell vertices. Where
-/// particles are larger than two cells, drops also cell vertices: it keeps those in each second
-/// column of cells, or row if the outline is steep; from four cells on in each fourth, from eight
-/// on in each eighth. Columns and rows are fixed in space, so the choice does not depend on the
-/// start of the ring and seldom changes while the outline moves. All cell vertices between two kept
-/// ones stay if one of them is too far from their chord, or outside of the rectangle of cells
-/// around it.
+/// particles are at least two cells wide, it drops cell vertices, too, and keeps the vertices in
+/// each second column of cells; in each second row if the outline is steep. From four cells on it
+/// keeps each fourth column, from eight on each eighth. Columns and rows are fixed in space, so the
+/// choice does not depend on the start of the ring and seldom changes while the outline moves. All
+/// cell vertices between two kept ones stay if one of them is too far from their chord, or outside
+/// of the rectangle of cells around it.
 ///
 /// Cell vertices are dropped only in frames with own sizes, without grains, phases and boxes, and
 /// not in rings that meet a wall. Cost: linear in the vertices.
