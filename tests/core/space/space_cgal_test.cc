@@ -18,6 +18,7 @@
 #include "simplify/mesh_faults.h"
 #include "space/space_particles.h"
 #include "support/random.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -77,7 +78,7 @@ Surface SurfaceOf(std::uint64_t seed, const SurfaceParameters& parameters) {
 class SurfacesByCgal : public ::testing::TestWithParam<SurfaceParameters> {};
 
 TEST_P(SurfacesByCgal, AreClosedManifoldAndDoNotIntersect) {
-  for (std::uint64_t seed = 0; seed < support::Frames(40); ++seed) {
+  for (std::uint64_t seed = 0; seed < support::Tries(40u); ++seed) {
     const Surface surface = SurfaceOf(seed, GetParam());
     const Soup soup = SoupOf(surface);
     ASSERT_TRUE(pmp::is_polygon_soup_a_polygon_mesh(soup.triangles)) << "seed " << seed;
@@ -91,7 +92,7 @@ TEST_P(SurfacesByCgal, AreClosedManifoldAndDoNotIntersect) {
 // One point of each surface moves, so that some surfaces intersect themselves.
 TEST_P(SurfacesByCgal, HaveTheVerdictOfTheChecks) {
   int broken = 0;
-  const auto frames = support::Frames(40);
+  const auto frames = support::Tries(40u);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     Surface surface = SurfaceOf(seed, GetParam());
     if (surface.PointCount() == 0) continue;

@@ -263,7 +263,7 @@ TEST(SurfaceCut, FlatLayerIsCutAtFourFaces) {
 }
 
 TEST(SurfaceCut, PartsOfRandomSurfacesMakeTheWhole) {
-  for (std::uint64_t seed = 1; seed <= support::Frames(60); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(60u); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     const auto placement = std::array{SurfacePlacement::kMarchingCubes, SurfacePlacement::kQef,

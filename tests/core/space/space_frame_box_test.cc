@@ -85,7 +85,7 @@ TEST_P(WrappedSurface, BallAcrossFaceEdgeAndCornerIsCut) {
 // Drops are ellipsoids, as without wrapping, and those across faces are cut.
 TEST(WrappedSpace, SmallDropsKeepTheirVolumes) {
   const PeriodicBox box = Cube(33, true);
-  for (std::uint64_t seed = 1; seed <= support::Frames(20); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(20u); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     SpaceParticles all;
@@ -295,7 +295,7 @@ TEST(SpaceFrameBox, StateHoldsTheBox) {
 // Noise of any density in boxes that leap, wrapped or not.
 TEST(SpaceFrameBox, RandomFramesKeepTheGuarantees) {
   SurfaceWorkspace workspace;
-  for (std::uint64_t seed = 1; seed <= support::Frames(8); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(8u); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     SurfaceParameters parameters = In(Cube(20, seed % 3 != 0));

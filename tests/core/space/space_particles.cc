@@ -1,11 +1,8 @@
 #include "space/space_particles.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <numeric>
 #include <utility>
-
-#include "support/tries.h"
 
 namespace partiemc::support {
 namespace {
@@ -170,11 +167,6 @@ SpaceParticles RandomSpaceScene(std::uint64_t seed) {
     }
   }
   return particles;
-}
-
-std::uint64_t Frames(std::uint64_t usual) {
-  const char* const wanted = std::getenv("PARTIEMC_SPACE_FRAMES");
-  return wanted == nullptr ? support::Tries(usual) : std::strtoull(wanted, nullptr, 10);
 }
 
 SpaceParticles Shuffled(const SpaceParticles& particles, Random& random) {

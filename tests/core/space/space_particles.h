@@ -34,9 +34,6 @@ SpaceParticles Box(const Vec3& low, const Vec3& high, double shake, support::Ran
 /// up to 1e6 from it, some with volumes, some rounded to float32 coordinates.
 SpaceParticles RandomSpaceScene(std::uint64_t seed);
 
-/// The number of frames of a test: PARTIEMC_SPACE_FRAMES or, without it, Tries(usual).
-std::uint64_t Frames(std::uint64_t usual);
-
 SpaceParticles Shuffled(const SpaceParticles& particles, support::Random& random);
 
 }  // namespace partiemc::support

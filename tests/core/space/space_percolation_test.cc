@@ -381,7 +381,7 @@ TEST(SurfacePercolation, ShortColumnsAreNoDrops) {
 TEST(SurfacePercolation, EveryParticleCountsOnce) {
   constexpr double kApart = 5.4, kLength = 4 * kApart;
   const PeriodicBox box = BoxOf(kLength, kLength, 0);
-  for (std::uint64_t seed = 1; seed <= support::Frames(20); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(20u); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     SpaceParticles all = Filled(21, 21, 4, .05, random, [](const Vec3&) { return true; });

@@ -81,7 +81,7 @@ TEST_P(SpaceSimplify, KeepsS1ToS5) {
   constexpr std::array<double, 5> kErrors = {.02, .05, .1, .3, 1};
   std::array<std::uint32_t, 5> repeated{}, certified{};
   std::size_t shells = 0, triangles = 0, left = 0;
-  const std::uint64_t frames = support::Frames(40);
+  const std::uint64_t frames = support::Tries(40u);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     SCOPED_TRACE(seed);
     const Surface all = SurfaceOf(support::RandomSpaceScene(seed), {.placement = GetParam()});

@@ -20,6 +20,7 @@
 #include "space_certificate/certificate.h"
 #include "space_vertices/thinning.h"
 #include "space_vertices/vertices.h"
+#include "support/tries.h"
 
 namespace partiemc {
 namespace {
@@ -126,7 +127,7 @@ Signs RandomSigns(std::uint64_t seed, std::int32_t first = 0) {
 }
 
 TEST(SpaceTopology, MarchingCubesOfRandomSignsKeepS1ToS5) {
-  const std::uint64_t frames = support::Frames(300);
+  const std::uint64_t frames = support::Tries(300u);
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const Signs signs = RandomSigns(seed);
     std::vector<Vec3> positions, normals;
@@ -207,7 +208,7 @@ Moved MoveVertices(const Signs& signs, double amount, double share, Random& rand
 }
 
 TEST(Certificate, KeepsMovedVerticesApart) {
-  const std::uint64_t frames = support::Frames(8);
+  const std::uint64_t frames = support::Tries(8u);
   int intersections = 0;
   std::size_t dropped = 0, dropped_anyhow = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
@@ -377,7 +378,7 @@ TEST_P(SpaceFrames, KeepS1ToS5) {
       {.placement = GetParam(), .clean = true, .min_component_particles = 3});
   SurfaceWorkspace workspace;
   Surface surface;
-  const std::uint64_t frames = support::Frames(40);
+  const std::uint64_t frames = support::Tries(40u);
   std::size_t triangles = 0;
   for (std::uint64_t seed = 0; seed < frames; ++seed) {
     const SpaceParticles particles = RandomSpaceScene(seed);

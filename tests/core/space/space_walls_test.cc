@@ -76,7 +76,7 @@ SpaceParticles OnFloor(double floor, double reach, double shake, Random& random,
 }
 
 TEST(SurfaceWalls, TanksAreFilledToTheirCorners) {
-  for (std::uint64_t seed = 1; seed <= support::Frames(6); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(6u); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     std::array<double, 3> low{}, count{};
@@ -221,7 +221,7 @@ TEST(SurfaceWalls, AttributesVaryOverTheFloor) {
 }
 
 TEST(SurfaceWalls, DropsKeepTheirShapeAtAWall) {
-  const auto tries = support::Frames(3);
+  const auto tries = support::Tries(3u);
   for (const double degrees : {60., 90., 120.}) {
     for (const double shake : {0., .2}) {
       DropErrors mean;
@@ -264,7 +264,7 @@ std::vector<WallPlane> RandomWalls(const SpaceParticles& particles, Random& rand
 TEST(SurfaceWalls, RandomFramesKeepTheGuarantees) {
   SurfaceWorkspace workspace;
   std::size_t with_cuts = 0;
-  const std::uint64_t frames = support::Frames(150);
+  const std::uint64_t frames = support::Tries(150u);
   for (std::uint64_t seed = 1; seed <= frames; ++seed) {
     SCOPED_TRACE(seed);
     const SpaceParticles particles = support::RandomSpaceScene(seed);
