@@ -15,12 +15,6 @@
 namespace partiemc {
 namespace {
 
-// In kernel radii of the largest particle: copies of percolating bodies reach kCopyMargin beyond
-// the box, at most one length. More than kCopyEnd before the end of the copies, the field and the
-// windows of an outline do not depend on this end. Means along a whole ring
-// (vertices/virtual_plane.cc) do, but little.
-constexpr double kCopyMargin = 6, kCopyEnd = 2;
-
 // Checks a frame as the output of the stream requires.
 absl::Status CheckForOutput(const PreparationInput& input, DistinctIdsScratch& scratch) {
   if (input.parameters.output == Output::kOutline) {

@@ -15,11 +15,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Copies of particles reach kCopyMargin kernel radii (of the largest particle) beyond the faces of
-// a periodic box, at most one length of the box. A body that stays kCopyEnd kernel radii away from
-// the end of the copies does not depend on it.
-constexpr double kCopyMargin = 6, kCopyEnd = 2;
-
 // Each particle has mirror images within the kernel radius of the largest particle and its own one.
 // So F is exact up to the first of these behind a wall, as smoothing near a wall requires.
 // Particles up to kWallTolerance sizes behind a wall count as before it. Particles closer to a wall

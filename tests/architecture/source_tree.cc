@@ -98,7 +98,9 @@ std::vector<std::string> Includes(std::string_view text) {
 
 IncludeGraph::IncludeGraph(const SourceTree& tree) {
   std::map<std::string_view, std::vector<std::string_view>> paths_by_name;
-  for (const auto& [path, text] : tree) paths_by_name[NameOf(path)].push_back(path);
+  for (const auto& [path, text] : tree) {
+    if (IsCxx(path)) paths_by_name[NameOf(path)].push_back(path);
+  }
   const auto file_of = [&](const std::string& includer, const std::string& include) {
     const std::string beside = std::string(DirectoryOf(includer)) + include;
     if (tree.contains(beside)) return beside;

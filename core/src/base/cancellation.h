@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 
 namespace partiemc {
 
@@ -36,5 +37,8 @@ inline void ThrowIfCancelled(const std::atomic<bool>* flag) {
 /// Checks the flag of the calling thread. Sequential code calls it about once per million steps;
 /// parallel.h checks the flag by itself.
 inline void ThrowIfCancelled() { ThrowIfCancelled(CancellationScope::Current()); }
+
+/// Loops with more work per step, such as one particle or cell, check the flag after this many.
+inline constexpr std::uint32_t kItemsPerCheck = 1 << 16;
 
 }  // namespace partiemc

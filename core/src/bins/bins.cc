@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,14 +22,12 @@
 namespace partiemc {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 // Tiles must exist within the kernel radius plus this margin of each particle, in cells. An inside
 // node is within the kernel radius of a particle, and the other corners of its active cells are at
 // most one cell farther. The nodes of a small hole are farther by at most the radius of a disk with
 // the area of the hole.
 double TileMargin(const Scale& scale) {
-  return 1 + std::sqrt(kHoleMarginParticles / kPi) * scale.spacing;
+  return 1 + std::sqrt(kHoleMarginParticles / std::numbers::pi) * scale.spacing;
 }
 
 // Particles per block, few enough that the data of a block stay in the nearest cache.

@@ -16,8 +16,6 @@
 namespace partiemc {
 namespace {
 
-constexpr std::size_t kMostNameBytes = 64;
-
 // Names appear in errors, which go to logs and messages, so they must be printable.
 std::string Escaped(std::string_view name) { return absl::CHexEscape({name.data(), name.size()}); }
 

@@ -15,7 +15,6 @@ namespace {
 
 // The largest coordinate in world units: the largest number of cells times the largest spacing. Up
 // to this limit, squares of distances stay finite.
-constexpr double kMaxCoordinate = 1e69;
 
 // Largest distance of positions from their plane, relative to their extent in the plane. The limit
 // is above the rounding noise of simulators and far below the depth of particles that fill space.
@@ -24,7 +23,7 @@ constexpr double kPlanarTolerance = 1e-5;
 // Values per task: enough that the cost of a task does not matter.
 constexpr std::size_t kCheckedAtOnce = 1 << 16;
 
-constexpr char kAxisNames[] = "xyz";
+constexpr char kAxes[] = "xyz";
 
 // Whether every value is a number of at most kMaxCoordinate. The loop has no early exit, so that
 // the compiler vectorises it.
@@ -96,7 +95,7 @@ absl::Status CheckPlanar(const Frame& frame, Plane plane) {
       std::max(high[axes.first] - low[axes.first], high[axes.second] - low[axes.second]);
   const double thickness = high[axes.normal] - low[axes.normal];
   if (thickness <= kPlanarTolerance * extent) return absl::OkStatus();
-  const std::string axis(1, kAxisNames[axes.normal]);
+  const std::string axis(1, kAxes[axes.normal]);
   return InvalidFrame(
       kReasonNotPlanar, CoordinateField("positions", farthest, axes.normal),
       ShortestNumber(high[axes.normal]),
@@ -184,13 +183,22 @@ PlaneVelocity VelocityOf(const Frame& frame, Plane plane, std::size_t particle) 
 }
 
 std::string CoordinateField(std::string_view array, std::size_t particle, int axis) {
-  return absl::StrCat(std::string(array), "[", particle, "].", std::string(1, kAxisNames[axis]));
+  return absl::StrCat(std::string(array), "[", particle, "].", std::string(1, kAxes[axis]));
 }
 
 absl::Status InvalidFrame(std::string_view reason, std::string field, std::string value,
                           std::string rule) {
   return ViolationError(absl::StatusCode::kInvalidArgument,
                         {std::string(reason), std::move(field), std::move(value), std::move(rule)});
+}
+
+absl::Status InvalidParameter(std::string_view field, std::string value, std::string_view rule) {
+  return InvalidFrame(kReasonOutOfRange, absl::StrCat("parameters.", std::string(field)),
+                      std::move(value), std::string(rule));
+}
+
+absl::Status InvalidParameter(std::string_view field, double value, std::string_view rule) {
+  return InvalidParameter(field, ShortestNumber(value), rule);
 }
 
 absl::Status Validate(const FrameLimits& limits) {

@@ -94,6 +94,16 @@ std::string CoordinateField(std::string_view array, std::size_t particle, int ax
 absl::Status InvalidFrame(std::string_view reason, std::string field, std::string value,
                           std::string rule);
 
+/// The same for a parameter that is out of range. `field`: its path without "parameters.".
+absl::Status InvalidParameter(std::string_view field, std::string value, std::string_view rule);
+absl::Status InvalidParameter(std::string_view field, double value, std::string_view rule);
+
+/// Limit of coordinates: squares and products of lengths stay finite.
+inline constexpr double kMaxCoordinate = 1e69;
+
+/// Limit of the names of attributes.
+inline constexpr std::size_t kMostNameBytes = 64;
+
 /// Checks the attributes of a frame. Errors: as CheckFrame.
 absl::Status CheckAttributes(const Frame& frame);
 

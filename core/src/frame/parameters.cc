@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "frame/calibration.h"
+#include "frame/frame_view.h"
 #include "frame/phase_rules.h"
 #include "frame/placement_traits.h"
 #include "frame/wall_rules.h"
@@ -22,18 +23,11 @@ constexpr auto kAllPlacements = [] {
   std::ranges::transform(kPlacements, placements.begin(), &PlacementTraits::placement);
   return placements;
 }();
-constexpr std::size_t kMostNameBytes = 64;
-// Limits of slice planes: squares and products stay finite.
-constexpr double kMaxCoordinate = 1e69, kMinNormal = 1e-60;
+// The least component of a plane's normal that is not 0: its square stays above 0.
+constexpr double kMinNormal = 1e-60;
 
 constexpr std::array kFills = {Fill::kNone, Fill::kGrid, Fill::kGreedy, Fill::kConforming,
                                Fill::kPolygon};
-
-absl::Status OutOfRange(std::string_view field, double value, std::string_view rule) {
-  return ViolationError(absl::StatusCode::kInvalidArgument,
-                        {std::string(kReasonOutOfRange), "parameters." + std::string(field),
-                         ShortestNumber(value), std::string(rule)});
-}
 
 // Names, in the order of the enumerators.
 constexpr std::array<std::string_view, 5> kFillNames = {"none", "grid", "greedy", "conforming",
@@ -48,12 +42,6 @@ std::string_view NameOf(const std::array<std::string_view, kCount>& names, Enum 
 
 bool Within(double value, double low, double high) { return value >= low && value <= high; }
 
-absl::Status Refused(std::string field, std::string value, std::string rule) {
-  return ViolationError(absl::StatusCode::kInvalidArgument,
-                        {std::string(kReasonOutOfRange), "parameters." + std::move(field),
-                         std::move(value), std::move(rule)});
-}
-
 // Checks a slice. `of`: the path of its section in errors; empty for the slice of the stream.
 absl::Status CheckSlice(const std::string& of, const SlicePlane& slice) {
   constexpr std::string_view kAxes = "xyz";
@@ -61,14 +49,14 @@ absl::Status CheckSlice(const std::string& of, const SlicePlane& slice) {
     for (const auto& [name, value] :
          {std::pair("origin", slice.origin[k]), std::pair("normal", slice.normal[k])}) {
       if (std::abs(value) <= kMaxCoordinate) continue;
-      return OutOfRange(absl::StrCat(of, "slice.", name, "_", std::string(1, kAxes[k])), value,
-                        "must be finite and at most 1e69 in magnitude");
+      return InvalidParameter(absl::StrCat(of, "slice.", name, "_", std::string(1, kAxes[k])),
+                              value, "must be finite and at most 1e69 in magnitude");
     }
   }
   const auto& normal = slice.normal;
   if (std::max({std::abs(normal[0]), std::abs(normal[1]), std::abs(normal[2])}) < kMinNormal) {
-    return OutOfRange(absl::StrCat(of, "slice.normal"), 0,
-                      "must have a component of 1e-60 or more in magnitude");
+    return InvalidParameter(absl::StrCat(of, "slice.normal"), 0,
+                            "must have a component of 1e-60 or more in magnitude");
   }
   return absl::OkStatus();
 }
@@ -76,8 +64,8 @@ absl::Status CheckSlice(const std::string& of, const SlicePlane& slice) {
 absl::Status CheckIsovalue(const std::string& of, double isovalue) {
   using P = ReconstructionParameters;
   if (Within(isovalue, P::kMinIsovalue, P::kMaxIsovalue)) return absl::OkStatus();
-  return OutOfRange(absl::StrCat(of, "isovalue"), isovalue,
-                    "must be in [0.01, 10]: the density is about 1 inside of bodies");
+  return InvalidParameter(absl::StrCat(of, "isovalue"), isovalue,
+                          "must be in [0.01, 10]: the density is about 1 inside of bodies");
 }
 
 // Checks the phase of a section, and that no other parameter excludes it.
@@ -85,7 +73,7 @@ absl::Status CheckPhase(const ReconstructionParameters& p, std::size_t section) 
   const Section& of = p.sections[section];
   const std::string field = absl::StrCat("sections[", section, "].phase");
   const auto refused = [&](const std::string& rule) {
-    return Refused(field, absl::StrCat(*of.phase), rule);
+    return InvalidParameter(field, absl::StrCat(*of.phase), rule);
   };
   if (p.output == Output::kSurface) {
     return refused("must be absent for a surface: surfaces have no phases");
@@ -119,8 +107,8 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
   }
   const bool is_surface = p.output == Output::kSurface;
   if (p.sections.size() > p.kMaxSections) {
-    return Refused("sections", absl::StrCat(p.sections.size()),
-                   absl::StrCat("must be at most ", p.kMaxSections));
+    return InvalidParameter("sections", absl::StrCat(p.sections.size()),
+                            absl::StrCat("must be at most ", p.kMaxSections));
   }
   for (std::size_t k = 0; k < p.sections.size(); ++k) {
     const Section& section = p.sections[k];
@@ -129,10 +117,11 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
       if (auto status = CheckPhase(p, k); !status.ok()) return status;
     }
     if (is_surface && !section.slice) {
-      return Refused(of + "slice", "absent", "must be present: the stream has a surface");
+      return InvalidParameter(of + "slice", "absent", "must be present: the stream has a surface");
     }
     if (section.slice && !p.slice && !is_surface) {
-      return Refused(of + "slice", "present", "must be absent unless parameters.slice is set");
+      return InvalidParameter(of + "slice", "present",
+                              "must be absent unless parameters.slice is set");
     }
     if (section.slice) {
       if (auto status = CheckSlice(of, *section.slice); !status.ok()) return status;
@@ -143,18 +132,21 @@ absl::Status CheckOutlines(const ReconstructionParameters& p) {
     }
   }
   if (p.slice && !p.spacing) {
-    return Refused("spacing", "absent", "must be given for a slice, which does not show it");
+    return InvalidParameter("spacing", "absent",
+                            "must be given for a slice, which does not show it");
   }
   if (KeepsGuarantees(p.placement)) return absl::OkStatus();
   if (p.slice) {
-    return Refused("placement", std::string(Name(p.placement)),
-                   "must be another one for a slice: its vertices are particles, which are not on "
-                   "the plane");
+    return InvalidParameter(
+        "placement", std::string(Name(p.placement)),
+        "must be another one for a slice: its vertices are particles, which are not on "
+        "the plane");
   }
   if (is_isoline) {
-    return Refused("placement", std::string(Name(p.placement)),
-                   "must be another one for an isovalue: its vertices are particles, which are not "
-                   "on the isoline");
+    return InvalidParameter(
+        "placement", std::string(Name(p.placement)),
+        "must be another one for an isovalue: its vertices are particles, which are not "
+        "on the isoline");
   }
   return absl::OkStatus();
 }
@@ -173,15 +165,15 @@ absl::Status CheckBox(const ReconstructionParameters& p) {
     return status;
   }
   if (p.box->wraps && !KeepsGuarantees(p.placement)) {
-    return Refused("box.wraps", "true",
-                   "must be false for farthest-particle, whose rings cannot be cut");
+    return InvalidParameter("box.wraps", "true",
+                            "must be false for farthest-particle, whose rings cannot be cut");
   }
   constexpr std::string_view kRule =
       "must be absent with a periodic box: a plane cuts only one image of a body";
-  if (p.slice) return Refused("slice", "present", std::string(kRule));
+  if (p.slice) return InvalidParameter("slice", "present", std::string(kRule));
   for (std::size_t k = 0; k < p.sections.size(); ++k) {
     if (!p.sections[k].slice) continue;
-    return Refused(absl::StrCat("sections[", k, "].slice"), "present", std::string(kRule));
+    return InvalidParameter(absl::StrCat("sections[", k, "].slice"), "present", std::string(kRule));
   }
   return absl::OkStatus();
 }
@@ -190,7 +182,7 @@ absl::Status CheckBox(const ReconstructionParameters& p) {
 absl::Status CheckSizes(const ReconstructionParameters& p) {
   if (p.sizes == Sizes::kEqual) return absl::OkStatus();
   const auto refused = [&](const std::string& with) {
-    return Refused("sizes", std::string(Name(p.sizes)), "must be equal " + with);
+    return InvalidParameter("sizes", std::string(Name(p.sizes)), "must be equal " + with);
   };
   const bool has_slice = p.slice || std::ranges::any_of(p.sections, [](const Section& section) {
                            return section.slice.has_value();
@@ -210,15 +202,16 @@ absl::Status CheckBoundary(const ReconstructionParameters& p) {
                             return s.isovalue.has_value();
                           });
   if (p.output == Output::kSurface) {
-    return Refused("boundary", std::string(Name(p.boundary)), "must be bulk for a surface");
+    return InvalidParameter("boundary", std::string(Name(p.boundary)),
+                            "must be bulk for a surface");
   }
   if (p.sizes == Sizes::kOwn && !is_isoline) {
     // Without a spacing, the smallest grain is the spacing, 2 / cell_size cells wide.
     if (p.spacing || p.cell_size * p.kSmallestGrain <= 2) return absl::OkStatus();
-    return OutOfRange("cell_size", p.cell_size,
-                      "must be at most 1.408 half spacings for grains without a spacing");
+    return InvalidParameter("cell_size", p.cell_size,
+                            "must be at most 1.408 half spacings for grains without a spacing");
   }
-  return Refused(
+  return InvalidParameter(
       "boundary", std::string(Name(p.boundary)),
       is_isoline ? "must be bulk with an isovalue" : "must be bulk unless sizes are own");
 }
@@ -227,7 +220,7 @@ absl::Status CheckBoundary(const ReconstructionParameters& p) {
 absl::Status CheckSurface(const ReconstructionParameters& p) {
   const auto check = [](const char* field, double value, const char* rule) {
     if (value >= 0 && std::isfinite(value)) return absl::OkStatus();
-    return OutOfRange(field, value, rule);
+    return InvalidParameter(field, value, rule);
   };
   if (auto status = check("surface.thinning_distance", p.surface.thinning_distance,
                           "must be 0 or more spacings, and finite");
@@ -241,18 +234,18 @@ absl::Status CheckSurface(const ReconstructionParameters& p) {
   }
   // A larger error would remove details as large as particles.
   if (!Within(p.surface.simplify, 0, 1)) {
-    return OutOfRange("surface.simplify", p.surface.simplify, "must be in [0, 1] spacings");
+    return InvalidParameter("surface.simplify", p.surface.simplify, "must be in [0, 1] spacings");
   }
   if (p.output != Output::kSurface) return absl::OkStatus();
-  if (!p.spacing) return Refused("spacing", "absent", "must be given for a surface");
+  if (!p.spacing) return InvalidParameter("spacing", "absent", "must be given for a surface");
   if (p.slice) {
-    return Refused("slice", "present",
-                   "must be absent for a surface: add a section with the slice");
+    return InvalidParameter("slice", "present",
+                            "must be absent for a surface: add a section with the slice");
   }
-  if (p.isovalue) return Refused("isovalue", "present", "must be absent for a surface");
+  if (p.isovalue) return InvalidParameter("isovalue", "present", "must be absent for a surface");
   if (!KeepsGuarantees(p.placement)) {
-    return Refused("placement", std::string(Name(p.placement)),
-                   "must be another one for a surface");
+    return InvalidParameter("placement", std::string(Name(p.placement)),
+                            "must be another one for a surface");
   }
   return absl::OkStatus();
 }
@@ -262,37 +255,37 @@ absl::Status CheckSurface(const ReconstructionParameters& p) {
 absl::Status Validate(const ReconstructionParameters& parameters) {
   const auto& p = parameters;
   if (p.spacing && !Within(*p.spacing, p.kMinSpacing, p.kMaxSpacing)) {
-    return OutOfRange("spacing", *p.spacing, "must be in [1e-60, 1e60]");
+    return InvalidParameter("spacing", *p.spacing, "must be in [1e-60, 1e60]");
   }
   if (!Within(p.kernel_radius, 1.5, 8)) {
-    return OutOfRange("kernel_radius", p.kernel_radius, "must be in [1.5, 8] spacings");
+    return InvalidParameter("kernel_radius", p.kernel_radius, "must be in [1.5, 8] spacings");
   }
   if (!Within(p.cell_size, 0.25, 4)) {
-    return OutOfRange("cell_size", p.cell_size, "must be in [0.25, 4] spacings");
+    return InvalidParameter("cell_size", p.cell_size, "must be in [0.25, 4] spacings");
   }
   if (p.reference_radius && !(*p.reference_radius > 0 && *p.reference_radius < p.kernel_radius)) {
-    return OutOfRange("reference_radius", *p.reference_radius,
-                      absl::StrCat("must be above 0 and below the kernel radius of ",
-                                   ShortestNumber(p.kernel_radius), " spacings"));
+    return InvalidParameter("reference_radius", *p.reference_radius,
+                            absl::StrCat("must be above 0 and below the kernel radius of ",
+                                         ShortestNumber(p.kernel_radius), " spacings"));
   }
   if (!Within(p.surface_offset, -1, 1)) {
-    return OutOfRange("surface_offset", p.surface_offset, "must be in [-1, 1] spacings");
+    return InvalidParameter("surface_offset", p.surface_offset, "must be in [-1, 1] spacings");
   }
   if (!Within(p.attribute_tolerance, 0, 1)) {
-    return OutOfRange("attribute_tolerance", p.attribute_tolerance,
-                      "must be in [0, 1], a fraction of the attribute's range");
+    return InvalidParameter("attribute_tolerance", p.attribute_tolerance,
+                            "must be in [0, 1], a fraction of the attribute's range");
   }
   if (!(p.min_component_area >= 0 && std::isfinite(p.min_component_area))) {
-    return OutOfRange("min_component_area", p.min_component_area,
-                      "must be 0 or more squared spacings, and finite");
+    return InvalidParameter("min_component_area", p.min_component_area,
+                            "must be 0 or more squared spacings, and finite");
   }
   if (p.noise_filter && !(*p.noise_filter > 0 && *p.noise_filter <= 1)) {
-    return OutOfRange("noise_filter", *p.noise_filter,
-                      "must be in (0, 1]: the weight of given positions");
+    return InvalidParameter("noise_filter", *p.noise_filter,
+                            "must be in (0, 1]: the weight of given positions");
   }
   if (p.phase_attribute.size() > kMostNameBytes) {
-    return Refused("phase_attribute", absl::StrCat(p.phase_attribute.size(), " bytes"),
-                   absl::StrCat("must be at most ", kMostNameBytes));
+    return InvalidParameter("phase_attribute", absl::StrCat(p.phase_attribute.size(), " bytes"),
+                            absl::StrCat("must be at most ", kMostNameBytes));
   }
   if (absl::Status status = CheckSurface(p); !status.ok()) return status;
   if (absl::Status status = CheckBox(p); !status.ok()) return status;
@@ -311,23 +304,24 @@ absl::Status Validate(const PeriodicBox& box, double kernel_radius, double spaci
     const auto [origin, length] = *box.axes[k];
     const std::string field = absl::StrCat("box.", std::string(1, kAxes[k]), ".");
     if (!(std::abs(origin) <= kMaxCoordinate)) {
-      return OutOfRange(field + "origin", origin, "must be finite and at most 1e69 in magnitude");
+      return InvalidParameter(field + "origin", origin,
+                              "must be finite and at most 1e69 in magnitude");
     }
     if (!(length > 0 && length <= kMaxCoordinate)) {
-      return OutOfRange(field + "length", length, "must be above 0 and at most 1e69");
+      return InvalidParameter(field + "length", length, "must be above 0 and at most 1e69");
     }
     if (spacing == 0) continue;
     const double least = kMinBoxLength * kernel_radius * spacing;
     // Sizes are roots of float32 volumes.
     if (length < (1 - kRoundingOfSizes) * least) {
-      return OutOfRange(field + "length", length,
-                        absl::StrCat("must be at least four kernel radii, ", least));
+      return InvalidParameter(field + "length", length,
+                              absl::StrCat("must be at least four kernel radii, ", least));
     }
     if (length > box.kMostSpacings * spacing) {
-      return OutOfRange(field + "length", length, "must be at most 1e8 spacings");
+      return InvalidParameter(field + "length", length, "must be at most 1e8 spacings");
     }
   }
-  if (!any) return Refused("box", "no axis", "must have one of the axes x, y, z");
+  if (!any) return InvalidParameter("box", "no axis", "must have one of the axes x, y, z");
   return absl::OkStatus();
 }
 

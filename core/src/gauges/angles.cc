@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <optional>
 #include <span>
 
@@ -20,11 +21,9 @@ constexpr double kRoundedSpacings = 1;
 constexpr int kSurfaceSamples = 200;
 constexpr double kFlankFrom = 0.2, kFlankTo = 0.8;
 
-constexpr double kPi = 3.141592653589793;
-
 double LengthOf(const Point& p) { return std::sqrt(p.x * p.x + p.y * p.y); }
 
-double Degrees(double radians) { return radians * (180 / kPi); }
+double Degrees(double radians) { return radians * (180 / std::numbers::pi); }
 
 // The outer ring with the largest area.
 std::optional<std::size_t> LargestRing(const Rings& rings) {
@@ -70,7 +69,7 @@ Contact FindContact(std::span<const Point> points, double reach, double rounded,
   const int toward_contact = is_meniscus ? first : -first;
   return {
       .place = circle->centre.x + toward_contact * circle->radius * std::sqrt(1 - cosine * cosine),
-      .angle = Degrees(is_meniscus ? kPi - angle : angle)};
+      .angle = Degrees(is_meniscus ? std::numbers::pi - angle : angle)};
 }
 
 }  // namespace

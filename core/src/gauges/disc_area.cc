@@ -4,13 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 
 namespace partiemc {
 namespace {
-
-constexpr double kPi = 3.141592653589793;
-
-double Cross(const Point& a, const Point& b) { return a.x * b.y - b.x * a.y; }
 
 // The signed area between the origin and an arc from the direction a to the direction b.
 double Sector(const Point& a, const Point& b, double radius) {
@@ -43,7 +40,7 @@ double TriangleInDisc(const Point& a, const Point& b, double radius) {
 double DiscAreaInBox(const Point& centre, double radius, const Point& min, const Point& max) {
   const Point low{min.x - centre.x, min.y - centre.y}, high{max.x - centre.x, max.y - centre.y};
   const double inner = std::min({-low.x, -low.y, high.x, high.y});
-  if (inner >= radius) return kPi * radius * radius;
+  if (inner >= radius) return std::numbers::pi * radius * radius;
   // The distance of the box from the centre of the disc, along each axis.
   const double x = std::max({low.x, -high.x, 0.0}), y = std::max({low.y, -high.y, 0.0});
   if (std::sqrt(x * x + y * y) >= radius) return 0;

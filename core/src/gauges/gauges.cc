@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -18,8 +19,6 @@
 
 namespace partiemc {
 namespace {
-
-constexpr double kPi = 3.141592653589793;
 
 constexpr std::size_t kMaxName = 40;
 // Limits of numbers and lengths, so that products of four coordinates stay finite.
@@ -143,7 +142,7 @@ std::vector<double> MeasurePacking(const Rings& rings, const Point& min, const P
   }
   double sum = 0;
   for (std::size_t k = 0; k < discs.areas.size(); ++k) {
-    const double radius = std::sqrt(double{discs.areas[k]} / kPi);
+    const double radius = std::sqrt(double{discs.areas[k]} / std::numbers::pi);
     sum += DiscAreaInBox(PointAt(discs.centres, k), radius, min, max);
   }
   return {area > 0 ? sum / area : NAN, sum, area};

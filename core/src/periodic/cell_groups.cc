@@ -10,7 +10,6 @@ namespace partiemc {
 namespace {
 
 // Number of items between two checks whether the frame is cancelled.
-constexpr std::uint32_t kItemsPerCheck = 1 << 16;
 
 bool AreEqual(const GridCell& a, const GridCell& b) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];

@@ -11,8 +11,6 @@
 namespace partiemc {
 namespace {
 
-constexpr std::array<const char*, 3> kAxisNames = {"x", "y", "z"};
-
 // Names the box of the frame in an error about the box of parameters.
 absl::Status OfFrame(const absl::Status& status) {
   std::optional<Violation> violation = FindViolation(status);

@@ -17,6 +17,8 @@
 
 namespace partiemc {
 
+inline constexpr std::array<const char*, 3> kAxisNames = {"x", "y", "z"};
+
 /// Sets Frame::box to the box that the stages use: the box of the frame with `wraps` of the
 /// stream's box, or the box of the stream if the frame has none. Errors, only if the frame has a
 /// box: INVALID_ARGUMENT (OUT_OF_RANGE) if the stream has no box, if the two boxes have different

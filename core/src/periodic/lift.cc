@@ -11,11 +11,10 @@
 #include "base/parallel.h"
 #include "frame/frame_view.h"
 #include "partiemc/status.h"
+#include "periodic/frame_box.h"
 
 namespace partiemc {
 namespace {
-
-constexpr std::array<const char*, 3> kAxisNames = {"x", "y", "z"};
 
 // Two cells with more pairs of particles than this are joined if their bounding boxes are within
 // the range.
@@ -30,7 +29,6 @@ constexpr double kMostCells = 1 << 30;
 constexpr double kMostLengths = 1e6;
 
 constexpr std::size_t kGrain = 1 << 12;
-constexpr std::size_t kItemsPerCheck = 1 << 16;
 
 std::uint8_t AxisBit(std::size_t axis) { return static_cast<std::uint8_t>(1u << axis); }
 
@@ -296,10 +294,8 @@ absl::Status CheckDistances(const Grid& grid, std::span<const Real> positions,
 absl::Status CheckAxes(const LiftInput& input) {
   for (std::size_t k = 0; k < 3; ++k) {
     if (!input.box.axes[k] || std::ranges::count(input.axes, static_cast<int>(k)) > 0) continue;
-    return ViolationError(
-        absl::StatusCode::kInvalidArgument,
-        {std::string(kReasonOutOfRange), absl::StrCat("parameters.box.", kAxisNames[k]), "present",
-         "must be absent: it is no axis of the plane of the particles"});
+    return InvalidParameter(absl::StrCat("box.", kAxisNames[k]), "present",
+                            "must be absent: it is no axis of the plane of the particles");
   }
   return absl::OkStatus();
 }

@@ -18,6 +18,12 @@
 
 namespace partiemc {
 
+/// In kernel radii of the largest particle: copies of percolating bodies reach kCopyMargin beyond
+/// the box, at most one length. A body, field or window that stays kCopyEnd away from the end of
+/// the copies does not depend on it. Means along a whole ring (vertices/virtual_plane.cc) do, but
+/// little.
+inline constexpr double kCopyMargin = 6, kCopyEnd = 2;
+
 /// The particles of one cell of the grid in which Lift searches neighbours.
 struct LiftCell {
   GridCell at{};

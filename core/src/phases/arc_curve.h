@@ -7,7 +7,6 @@
 #include <span>
 
 #include "base/point.h"
-#include "walls/point_math.h"
 
 namespace partiemc {
 

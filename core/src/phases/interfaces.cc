@@ -5,10 +5,10 @@
 #include <optional>
 
 #include "base/parallel.h"
+#include "base/point.h"
 #include "phases/arc_curve.h"
 #include "vertices/placement.h"
 #include "vertices/ring_filters.h"
-#include "walls/point_math.h"
 #include "walls/tile_point.h"
 
 namespace partiemc {

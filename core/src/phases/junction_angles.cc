@@ -4,7 +4,6 @@
 
 #include "base/point.h"
 #include "phases/arc_curve.h"
-#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

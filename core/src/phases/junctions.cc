@@ -9,9 +9,9 @@
 #include <span>
 #include <tuple>
 
+#include "base/point.h"
 #include "phases/arc_curve.h"
 #include "phases/body_corner.h"
-#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

@@ -13,8 +13,6 @@
 namespace partiemc {
 namespace {
 
-constexpr std::size_t kItemsPerCheck = 1 << 16;
-
 struct Node {
   std::int64_t x = 0, y = 0;
 

@@ -11,8 +11,6 @@
 namespace partiemc {
 namespace {
 
-constexpr std::size_t kItemsPerCheck = 1 << 16;
-
 // Joins the components that share a particle.
 void JoinImages(const BodyChoiceInput& input, const RingTopology& topology, BodyChoice& c) {
   const std::uint32_t components = topology.components.size();

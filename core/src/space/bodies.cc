@@ -12,7 +12,6 @@ namespace partiemc::space {
 namespace {
 
 constexpr std::uint64_t kFirstColumn = 0x0101010101010101, kLastColumn = 0x8080808080808080;
-constexpr std::uint32_t kItemsPerCheck = 1 << 16;
 
 /// The nodes of `inside`, the inside nodes of a brick, that are connected to `seed` in this brick.
 BrickBits Connected(const BrickBits& inside, const BrickBits& seed) {
@@ -61,7 +60,7 @@ bool AreJoined(const BrickBits& low, const BrickBits& high, int axis) {
   return false;
 }
 
-std::uint32_t RootOf(std::vector<Bodies::Part>& parts, std::uint32_t part) {
+std::uint32_t RootPart(std::vector<Bodies::Part>& parts, std::uint32_t part) {
   return partiemc::RootOf(parts, part, &Bodies::Part::body);
 }
 
@@ -74,7 +73,7 @@ void JoinParts(const BrickDirectory& bricks, Bodies& bodies) {
       for (std::uint32_t a = bodies.first[brick]; a < bodies.first[brick + 1]; ++a) {
         for (std::uint32_t b = bodies.first[other]; b < bodies.first[other + 1]; ++b) {
           if (!AreJoined(bodies.parts[a].nodes, bodies.parts[b].nodes, axis)) continue;
-          const std::uint32_t p = RootOf(bodies.parts, a), q = RootOf(bodies.parts, b);
+          const std::uint32_t p = RootPart(bodies.parts, a), q = RootPart(bodies.parts, b);
           bodies.parts[std::max(p, q)].body = std::min(p, q);
         }
       }
@@ -85,7 +84,7 @@ void JoinParts(const BrickDirectory& bricks, Bodies& bodies) {
 /// Numbers the bodies and finds their lowest nodes.
 void NumberBodies(const BrickDirectory& bricks, Bodies& bodies) {
   const auto parts = static_cast<std::uint32_t>(bodies.parts.size());
-  for (std::uint32_t part = 0; part < parts; ++part) RootOf(bodies.parts, part);
+  for (std::uint32_t part = 0; part < parts; ++part) RootPart(bodies.parts, part);
   std::vector<std::int64_t>& lowest_z = bodies.lowest_z;
   lowest_z.clear();
   // The root of a body is its first part.

@@ -15,8 +15,6 @@ namespace {
 
 using Image = BodyImageScratch::Image;
 
-constexpr std::uint32_t kItemsPerCheck = 1 << 16;
-
 std::uint32_t RootOf(std::vector<Image>& images, std::uint32_t body) {
   return partiemc::RootOf(images, body, &Image::set);
 }

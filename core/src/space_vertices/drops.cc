@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <numbers>
 #include <utility>
 
 #include "base/bits.h"
@@ -18,7 +19,7 @@ constexpr double kMostBricksAlong = 4;
 // Radius in spacings. Smaller drops become icosahedra, whose edges are about as long as a cell of
 // the default size.
 constexpr double kSmallRadius = .75;
-constexpr std::uint32_t kItemsPerCheck = 1 << 16, kTrianglesPerCheck = 1 << 12;
+constexpr std::uint32_t kTrianglesPerCheck = 1 << 12;
 
 // Drops that are bent, hollow or in pieces fill less of the ellipsoid with their moments.
 constexpr double kLeastFilling = .5;
@@ -26,10 +27,8 @@ constexpr double kLeastFilling = .5;
 // distance from the origin of the world.
 constexpr double kLeastAxis = 1e-3, kLeastAxisByDistance = 1e-9;
 
-constexpr double kPi = 3.14159265358979323846;
-
 /// The radius of a ball with a volume.
-double RadiusOf(double volume) { return CubeRoot(3 / (4 * kPi) * volume); }
+double RadiusOf(double volume) { return CubeRoot(3 / (4 * std::numbers::pi) * volume); }
 
 /// A polyhedron with its corners on the unit sphere.
 struct Polyhedron {
@@ -140,7 +139,7 @@ bool MakeEllipsoid(const Scale& scale, const Drops::Drop& drop, Drops& drops) {
   if (!(determinant > 0) || !std::isfinite(determinant)) return false;
   const Polyhedron& of = PolyhedronFor(RadiusOf(drop.volume) / scale.spacing);
   const double factor = CubeRoot(drop.volume / (determinant * of.volume));
-  if (!(drop.volume > kLeastFilling * (4 * kPi / 3) * determinant)) return false;
+  if (!(drop.volume > kLeastFilling * (4 * std::numbers::pi / 3) * determinant)) return false;
   // A lower bound of its shortest half axis, in cells. Rounding must not fold the triangles.
   const double shortest = factor * determinant / (xx + yy + zz);
   const double farthest =

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "walls/point_math.h"
+#include "base/point.h"
 #include "walls/tile_point.h"
 
 namespace partiemc {

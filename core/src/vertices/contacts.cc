@@ -7,9 +7,9 @@
 #include <span>
 
 #include "base/cancellation.h"
+#include "base/point.h"
 #include "vertices/contact_curve.h"
 #include "vertices/vertices.h"
-#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

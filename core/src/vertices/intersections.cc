@@ -34,12 +34,12 @@ constexpr std::uint32_t kBlockRuns = 8;
 // Bits of Run::directions.
 constexpr unsigned kRightward = 1, kLeftward = 2, kUpward = 4, kDownward = 8;
 
-struct Segment {
+struct RingSegment {
   Point a, b;
 };
 
 /// Whether two successive segments overlap in more than their common point.
-bool FoldsBack(const Segment& first, const Segment& second) {
+bool FoldsBack(const RingSegment& first, const RingSegment& second) {
   const Point& corner = first.b;
   if (first.a == corner || second.b == corner) return false;
   return SweepsBefore(first.a, corner) == SweepsBefore(second.b, corner) &&
@@ -54,7 +54,7 @@ struct Search {
   std::span<Run> RunsOf(const Block& block) const {
     return std::span(buffers.runs).subspan(block.first_run, block.last_run - block.first_run);
   }
-  Segment SegmentAt(const Run& run, std::uint32_t i) const {
+  RingSegment SegmentAt(const Run& run, std::uint32_t i) const {
     return {PointAt(points, i), PointAt(points, i + 1 == run.ring_end ? run.ring_begin : i + 1)};
   }
 };
@@ -141,8 +141,8 @@ void FillGrid(Search& s, const HierarchicalGrid& grid) {
 
 /// Whether two segments count as a pair: successive segments if they overlap, others if they touch.
 bool Touches(const Search& s, const Run& of_i, std::uint32_t i, const Run& of_j, std::uint32_t j) {
-  const Segment a = s.SegmentAt(of_i, i);
-  const Segment b = s.SegmentAt(of_j, j);
+  const RingSegment a = s.SegmentAt(of_i, i);
+  const RingSegment b = s.SegmentAt(of_j, j);
   const bool a_follows = Previous(of_i, i) == j;
   const bool b_follows = Previous(of_j, j) == i;
   if (!a_follows && !b_follows) return SegmentsTouch(a.a, a.b, b.a, b.b);
@@ -166,7 +166,7 @@ void ForEachPairBetween(const Search& s, const Run& first, const Run& second, Vi
                        Previous(first, first.first) == second.last - 1;
   if (follows && (first.directions & second.directions) != 0) return;
   for (std::uint32_t i = first.first; i < first.last; ++i) {
-    const Segment segment = s.SegmentAt(first, i);
+    const RingSegment segment = s.SegmentAt(first, i);
     Box box;
     box.Add(segment.a);
     box.Add(segment.b);

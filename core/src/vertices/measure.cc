@@ -55,7 +55,7 @@ WindowMeasures MeasureInWindow(std::span<const double> points, const Window& win
     const double size = sizes.empty() ? 1 : (double{sizes[k]} + sizes[next]) / 2;
     const Point a = PointAt(points, k), b = PointAt(points, next);
     const double dx = b.x - a.x, dy = b.y - a.y;
-    std::array<double, 6> at{0, 1, 1, 1, 1, 1};
+    std::array<double, 6> at{0, 1, 1, 1, 1, 1};  // Ends of pieces; the unused ones are 1.
     std::size_t pieces = 1;
     const auto split = [&](double from, double step, double line) {
       const double t = (line - from) / step;
@@ -63,8 +63,7 @@ WindowMeasures MeasureInWindow(std::span<const double> points, const Window& win
     };
     for (const double line : {low[0], high[0]}) split(a.x, dx, line);
     for (const double line : {low[1], high[1]}) split(a.y, dy, line);
-    std::sort(at.begin() + 1, at.begin() + pieces);
-    at[pieces] = 1;
+    std::ranges::sort(at);
     const auto clamped = [&](double t) {
       return Point{std::clamp(a.x + t * dx, low[0], high[0]),
                    std::clamp(a.y + t * dy, low[1], high[1])};

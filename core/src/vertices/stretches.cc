@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include "base/point.h"
 #include "vertices/contact_curve.h"
-#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/point.h"
 #include "core/internal/research.h"
-#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

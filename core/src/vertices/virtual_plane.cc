@@ -8,6 +8,7 @@
 
 #include "base/cancellation.h"
 #include "base/parallel.h"
+#include "base/point.h"
 #include "base/prefetch.h"
 #include "core/internal/research.h"
 #include "sampler/query_batch.h"
@@ -22,8 +23,6 @@ namespace {
 
 // Prefetch distance for planes, in segments.
 constexpr std::size_t kFetchedAhead = 24;
-
-double Dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y; }
 
 VertexNormal UnitOf(const Point& v) {
   const double square = Dot(v, v);

@@ -6,9 +6,9 @@
 #include <optional>
 #include <utility>
 
+#include "base/point.h"
 #include "vertices/placement.h"
 #include "vertices/vertices.h"
-#include "walls/point_math.h"
 
 namespace partiemc {
 namespace {

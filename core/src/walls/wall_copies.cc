@@ -16,7 +16,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Of the box, beyond which images are refused, as in periodic/lift.cc.
 constexpr double kMostLengths = 1e6;
-constexpr std::size_t kParticlesPerCheck = 1 << 16;
 
 struct Box {
   Point low{kInfinity, kInfinity}, high{-kInfinity, -kInfinity};
@@ -152,7 +151,7 @@ absl::Status WallCopies::TakeParticles(const WallParticleInput& input, const Wal
   };
   double count = 0;
   for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
-    if (k % kParticlesPerCheck == 0) ThrowIfCancelled();
+    if (k % kItemsPerCheck == 0) ThrowIfCancelled();
     const PlaneImages images = images_of(k);
     if (images.Count() > 0 && images.AreFar()) {
       const Point at = PositionOf(frame, input.plane, k);
@@ -181,7 +180,7 @@ absl::Status WallCopies::TakeParticles(const WallParticleInput& input, const Wal
   std::visit(
       [&](auto positions) {
         for (std::size_t k = 0; k < frame.ParticleCount(); ++k) {
-          if (k % kParticlesPerCheck == 0) ThrowIfCancelled();
+          if (k % kItemsPerCheck == 0) ThrowIfCancelled();
           ForEachOffset(range, images_of(k), [&](const Point& offset) {
             for (std::size_t axis = 0; axis < components; ++axis) {
               const auto at = static_cast<double>(positions[components * k + axis]);

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "base/cancellation.h"
-#include "walls/point_math.h"
+#include "base/point.h"
 
 namespace partiemc {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "base/cancellation.h"
 #include "base/parallel.h"
-#include "walls/point_math.h"
+#include "base/point.h"
 #include "walls/tile_point.h"
 
 namespace partiemc {

@@ -14,7 +14,6 @@ namespace partiemc {
 namespace {
 
 constexpr std::size_t kAxes = 3;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Bytes of a particle in a WallImageScratch. Vectors that grow may hold twice as much.
 std::uint64_t BytesOfParticle(const Frame& frame) {
@@ -109,6 +108,7 @@ void MirrorAlong(std::size_t axis, const WallImageInput& input, const FluidBox& 
 }  // namespace
 
 FluidBox FluidBoxOf(std::span<const WallPlane> planes) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   FluidBox box{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
   for (const WallPlane& plane : planes) {
     const auto axis = static_cast<std::size_t>(plane.axis);

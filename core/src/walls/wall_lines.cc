@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "walls/point_math.h"
+#include "base/point.h"
 
 namespace partiemc {
 namespace {
