@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <iomanip>
 #include <iostream>
 #include <map>
@@ -22,11 +21,6 @@ namespace partiemc {
 namespace {
 
 using support::Particles;
-
-std::uint64_t NumberFromEnvironment(const char* name, std::uint64_t otherwise) {
-  const char* text = std::getenv(name);
-  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
-}
 
 struct Trial {
   std::vector<Particles> frames;  // Figures of one stream.
@@ -164,7 +158,7 @@ void CheckPlacement(const Trial& trial, Placement placement, Tally& tally) {
 
 TEST(Guarantees, HoldForRandomFramesAllPlacementsAndAllFills) {
   const std::uint64_t frames = support::Tries(200u);
-  const std::uint64_t first = NumberFromEnvironment("PARTIEMC_SEED", 1);
+  const std::uint64_t first = support::FirstSeed();
   std::map<Placement, Tally> tallies;
   for (std::uint64_t seed = first; seed < first + frames; ++seed) {
     SCOPED_TRACE(testing::Message() << "PARTIEMC_SEED=" << seed);

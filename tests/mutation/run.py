@@ -30,12 +30,10 @@ LIST = pathlib.Path(__file__).resolve().parent / "mutations.toml"
 ROOMS = {
     "core": ["core_test", "core_threads_test", "core_allocation_test", "space_test"],
     "server": [
-        "session_test", "checkpoint_test", "stream_registry_test", "busy_streams_test",
-        "compute_pool_test", "watch_state_machine_test", "stream_state_machine_test",
-        "memory_budget_test", "idle_test", "message_orders_test", "answer_afterwards_test",
-        "codec_test", "bearer_tokens_test", "tls_identity_test", "options_test", "security_test",
-        "observed_test", "watch_test", "watch_history_test", "protocol_test", "streams_test", "overload_test",
-        "resume_protocol_test", "error_table_test", "operation_test"],
+        "session_test", "checkpoint_test", "calls_test", "server_test", "codec_test",
+        "security_test", "observed_test", "watch_test", "watch_history_test", "protocol_test",
+        "streams_test", "overload_test", "resume_protocol_test", "error_table_test",
+        "operation_test"],
     "client": [
         "client_input_test", "client_output_test", "client_recording_test", "client_stream_test",
         "client_resume_test", "latest_sender_test", "client_credentials_test",
@@ -44,8 +42,7 @@ ROOMS = {
 # A few tests that take half of the time: run last, if no other test has failed.
 SLOW = {"core_test": "Guarantees.*:Roots.*:Bilinear.*:TrackedTurmoil*:TJunctions.*"}
 # Programs built for ThreadSanitizer.
-TSAN_ROOM = ["compute_pool_test", "watch_state_machine_test", "stream_registry_test",
-             "session_test", "stream_state_machine_test", "message_orders_test"]
+TSAN_ROOM = ["calls_test", "session_test"]
 
 
 def fail(message):

@@ -12,17 +12,15 @@
 
 #include "partiemc/status.h"
 #include "server/security/peer_accounts.h"
+#include "support/reason_of.h"
 
 namespace partiemc::server {
 namespace {
 
+using support::ReasonOf;
+
 using Kind = CallerAccount::Kind;
 using Place = CallerAccount::Place;
-
-std::string ReasonOf(const absl::Status& status) {
-  const auto violation = FindViolation(status);
-  return violation ? violation->reason : status.ToString();
-}
 
 TEST(CallerAccount, HasAsManyPlacesOfEachKindAsItsQuotaSays) {
   const auto account =

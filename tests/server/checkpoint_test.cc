@@ -15,9 +15,12 @@
 #include "server/moving_blob.h"
 #include "server/stream/session.h"
 #include "server/stream/stream_token.h"
+#include "support/reason_of.h"
 
 namespace partiemc::server {
 namespace {
+
+using support::ReasonOf;
 
 constexpr unsigned kSeed = 31;
 constexpr std::uint64_t kFrames = 12;
@@ -26,11 +29,6 @@ const oneapi::tbb::global_control one_thread(oneapi::tbb::global_control::max_al
                                              1);
 
 using Digests = std::pair<std::uint64_t, std::uint64_t>;
-
-std::string ReasonOf(const absl::Status& status) {
-  const auto violation = FindViolation(status);
-  return violation ? violation->reason : status.ToString();
-}
 
 // Answers the next frame; its particles may have ids.
 Digests Answer(Session& session, Worker& worker, bool has_ids = false) {

@@ -235,14 +235,15 @@ TEST_F(Ledger, NoLimitMeansNoLimit) {
   EXPECT_EQ(free.Examine(free.Take(), reading_, now_ + seconds(20)), std::nullopt);
 }
 
-constexpr ConnectionLimits kLimits{.connections = 10, .of_address = 4, .new_of_address = 2};
+constexpr ConnectionLimits kConnectionLimits{
+    .connections = 10, .of_address = 4, .new_of_address = 2};
 
 class Counts : public ::testing::Test {
  protected:
   Admission Add(const std::string& address) { return counts_.Add(address, now_); }
 
   Clock::time_point now_ = Clock::time_point(seconds(1'000));
-  ConnectionCounts counts_{kLimits};
+  ConnectionCounts counts_{kConnectionLimits};
 };
 
 TEST_F(Counts, AnAddressHasSoManyConnections) {

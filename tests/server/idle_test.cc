@@ -21,13 +21,13 @@ using std::chrono::milliseconds;
 using std::chrono::minutes;
 using std::chrono::steady_clock;
 
-constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
-constexpr IdleLimits kIdle{.opening = minutes(1), .streaming = minutes(10)};
+constexpr FrameLimits kBlobLimits{.max_particles = 2000, .max_tiles = 1000};
+constexpr IdleLimits kIdleLimits{.opening = minutes(1), .streaming = minutes(10)};
 
 class Idle : public ::testing::Test {
  protected:
   // EndIfIdle of the machine as if `later` had passed.
-  steady_clock::time_point EndIfIdle(milliseconds later, const IdleLimits& limits = kIdle) {
+  steady_clock::time_point EndIfIdle(milliseconds later, const IdleLimits& limits = kIdleLimits) {
     return transport_.machine().EndIfIdle(limits, steady_clock::now() + later);
   }
   void ExpectIdle(const char* value) {
@@ -49,13 +49,13 @@ class Idle : public ::testing::Test {
   }
 
   ComputePool pool_{1};
-  MemoryTransport transport_{pool_, 2, BlobParameters(), kLimits};
+  MemoryTransport transport_{pool_, 2, BlobParameters(), kBlobLimits};
 };
 
 TEST_F(Idle, ACallThatNeverOpensEnds) {
   const auto look_again = EndIfIdle(milliseconds(0));
-  EXPECT_LE(look_again, steady_clock::now() + kIdle.opening);
-  EndIfIdle(kIdle.opening);
+  EXPECT_LE(look_again, steady_clock::now() + kIdleLimits.opening);
+  EndIfIdle(kIdleLimits.opening);
   EXPECT_FALSE(transport_.Receive().has_value());
   ExpectIdle("sends no `open` for 60 s");
 }
@@ -67,7 +67,7 @@ TEST_F(Idle, AStreamWithoutAFrameEndsAndOneThatHadOneInTimeDoesNot) {
   const auto before_frame = steady_clock::now();
   transport_.Send(1, MovingBlob(1, 0));
   ASSERT_EQ(transport_.Receive()->sequence, 1u);
-  EXPECT_GE(EndIfIdle(milliseconds(0)), before_frame + kIdle.streaming);
+  EXPECT_GE(EndIfIdle(milliseconds(0)), before_frame + kIdleLimits.streaming);
   EndIfIdle(minutes(10));
   EXPECT_FALSE(transport_.Receive().has_value());
   ExpectIdle("sends no frame for 600 s");
@@ -100,27 +100,28 @@ TEST_F(Idle, TheTimeToTakeAnAnswerBeginsWithItsWrite) {
   const auto before_answer = steady_clock::now();
   go.set_value();
   while (transport_.machine().counts().frames < 2) std::this_thread::yield();
-  EXPECT_GE(EndIfIdle(milliseconds(0)), before_answer + kIdle.streaming);
+  EXPECT_GE(EndIfIdle(milliseconds(0)), before_answer + kIdleLimits.streaming);
 }
 
 TEST(IdleStream, WaitingForAPermitToReadDoesNotCount) {
   SteppedPool pool;
   MemoryBudget budget(1, {.reads = {.streams_beyond = 1, .message_bytes = 1000}});
-  ScriptedTransport first(pool, budget, 2, BlobParameters(), kLimits);
-  ScriptedTransport second(pool, budget, 2, BlobParameters(), kLimits);
+  ScriptedTransport first(pool, budget, 2, BlobParameters(), kBlobLimits);
+  ScriptedTransport second(pool, budget, 2, BlobParameters(), kBlobLimits);
   for (ScriptedTransport* transport : {&first, &second}) {
     transport->BringRequest({.kind = RequestKind::kOpen, .positions = {}});
     transport->EndWrite(true);
   }
   ASSERT_TRUE(first.reading());
   ASSERT_FALSE(second.reading()) << "the first stream has the only slot";
-  second.machine().EndIfIdle(kIdle, steady_clock::now() + minutes(100));
+  second.machine().EndIfIdle(kIdleLimits, steady_clock::now() + minutes(100));
   ASSERT_FALSE(second.finished().has_value());
   const auto before_read = steady_clock::now();
   first.machine().Cancelled();
   ASSERT_TRUE(second.reading());
-  EXPECT_GE(second.machine().EndIfIdle(kIdle, before_read), before_read + kIdle.streaming);
-  second.machine().EndIfIdle(kIdle, steady_clock::now() + minutes(10));
+  EXPECT_GE(second.machine().EndIfIdle(kIdleLimits, before_read),
+            before_read + kIdleLimits.streaming);
+  second.machine().EndIfIdle(kIdleLimits, steady_clock::now() + minutes(10));
   EXPECT_TRUE(second.finished().has_value());
 }
 
@@ -143,7 +144,7 @@ TEST(IdleTimer, EndsEveryStreamOfTheRegistryThatWaitsForTooLong) {
   const IdleTimer timer(registry, watchers, calls, limits);
   // The timer already sleeps when they arrive.
   for (int round = 0; round < 3; ++round) {
-    MemoryTransport transport(pool, 2, BlobParameters(), kLimits);
+    MemoryTransport transport(pool, 2, BlobParameters(), kBlobLimits);
     ASSERT_TRUE(registry.Enter(transport.machine().shared_from_this()).ok());
     EXPECT_EQ(FindViolation(transport.status())->reason, kReasonIdle);
     registry.Leave(transport.machine());

@@ -20,19 +20,18 @@ namespace partiemc::server {
 namespace {
 
 using ::testing::ElementsAre;
-using Frame = LevelQueue::Frame;
 
 constexpr std::size_t kLevelBytes = 1000;
 
 LevelOfDetail Error(double error) { return {.max_error = error, .max_triangles = {}}; }
 
-std::uint64_t NumberOf(const Frame& frame) {
+std::uint64_t NumberOf(const LevelQueue::Frame& frame) {
   return static_cast<const NumberedFrame&>(*frame).number;
 }
 
 class TestWaiter final : public LevelQueue::Waiter {
  public:
-  void LevelDone(const absl::StatusOr<Frame>& level) override {
+  void LevelDone(const absl::StatusOr<LevelQueue::Frame>& level) override {
     const std::lock_guard lock(mutex_);
     done_ = level;
     changed_.notify_all();
@@ -41,7 +40,7 @@ class TestWaiter final : public LevelQueue::Waiter {
   int Wait() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return done_.has_value(); });
-    const absl::StatusOr<Frame> level = *std::exchange(done_, std::nullopt);
+    const absl::StatusOr<LevelQueue::Frame> level = *std::exchange(done_, std::nullopt);
     if (!level.ok()) return -1;
     return *level == nullptr ? 0 : static_cast<int>(NumberOf(*level));
   }
@@ -49,7 +48,7 @@ class TestWaiter final : public LevelQueue::Waiter {
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<absl::StatusOr<Frame>> done_;
+  std::optional<absl::StatusOr<LevelQueue::Frame>> done_;
 };
 
 class LevelQueueTest : public ::testing::Test {
@@ -59,7 +58,7 @@ class LevelQueueTest : public ::testing::Test {
     queue_->Stop();
   }
 
-  static Frame FrameOf(std::uint64_t number) {
+  static LevelQueue::Frame FrameOf(std::uint64_t number) {
     return std::make_shared<NumberedFrame>(number, kLevelBytes);
   }
   LevelQueue::Seat Join(double error, const void* stream = nullptr) {
@@ -84,9 +83,8 @@ class LevelQueueTest : public ::testing::Test {
   bool lacks_memory_ = false;
   const std::shared_ptr<LevelQueue> queue_ = std::make_shared<LevelQueue>(
       dispatcher_,
-      [this](const Frame& exact, const LevelOfDetail&, const std::atomic<bool>& cancelled) {
-        return Compute(exact, cancelled);
-      },
+      [this](const LevelQueue::Frame& exact, const LevelOfDetail&,
+             const std::atomic<bool>& cancelled) { return Compute(exact, cancelled); },
       LevelQueue::Limits{.levels_per_stream = 3,
                          .kept_bytes = 2 * (kLevelBytes + kPublishedBytes)});
 
@@ -96,7 +94,7 @@ class LevelQueueTest : public ::testing::Test {
     held_ = held;
     changed_.notify_all();
   }
-  LevelQueue::Made Compute(const Frame& exact, const std::atomic<bool>& cancelled) {
+  LevelQueue::Made Compute(const LevelQueue::Frame& exact, const std::atomic<bool>& cancelled) {
     std::unique_lock lock(mutex_);
     begun_.push_back(NumberOf(exact));
     changed_.notify_all();
@@ -115,7 +113,7 @@ class LevelQueueTest : public ::testing::Test {
 };
 
 TEST_F(LevelQueueTest, ComputesALevelOnceForAllThatShareIt) {
-  const Frame frame = FrameOf(1);
+  const LevelQueue::Frame frame = FrameOf(1);
   const auto a = Join(.1), b = Join(.1), other = Join(.2);
   TestWaiter first, second, late, of_other;
   Hold();
@@ -153,7 +151,7 @@ TEST_F(LevelQueueTest, RefusesMoreLevelsOfAStreamThanTheLimit) {
 }
 
 TEST_F(LevelQueueTest, WatchersThatMaySkipMeetAtTheNewestFrame) {
-  const Frame frames[] = {FrameOf(1), FrameOf(2), FrameOf(3), FrameOf(4)};
+  const LevelQueue::Frame frames[] = {FrameOf(1), FrameOf(2), FrameOf(3), FrameOf(4)};
   const auto seat = Join(.1);
   TestWaiter slow, skipping, every, newest;
   Hold();
@@ -175,7 +173,7 @@ TEST_F(LevelQueueTest, PairsOfStreamAndLevelTakeTurns) {
   const auto often = Join(.1), rare = Join(.2);
   TestWaiter waiters[5];
   Hold();
-  const Frame frames[] = {FrameOf(1), FrameOf(2), FrameOf(3), FrameOf(4), FrameOf(5)};
+  const LevelQueue::Frame frames[] = {FrameOf(1), FrameOf(2), FrameOf(3), FrameOf(4), FrameOf(5)};
   for (int k = 0; k < 4; ++k) queue_->Request(often, frames[k], false, waiters[k]);
   WaitUntilBegun(1);
   queue_->Request(rare, frames[4], false, waiters[4]);
@@ -185,7 +183,7 @@ TEST_F(LevelQueueTest, PairsOfStreamAndLevelTakeTurns) {
 }
 
 TEST_F(LevelQueueTest, AFrameThatNobodyWaitsForIsCancelled) {
-  const Frame frames[] = {FrameOf(1), FrameOf(2)};
+  const LevelQueue::Frame frames[] = {FrameOf(1), FrameOf(2)};
   const auto seat = Join(.1);
   TestWaiter left, queued, other;
   Hold();
@@ -203,22 +201,22 @@ TEST_F(LevelQueueTest, AFrameThatNobodyWaitsForIsCancelled) {
 }
 
 TEST_F(LevelQueueTest, KeepsLevelsWithinItsBytesAndWhileTheirFramesExist) {
-  std::vector<Frame> frames = {FrameOf(1), FrameOf(2), FrameOf(3)};
+  std::vector<LevelQueue::Frame> frames = {FrameOf(1), FrameOf(2), FrameOf(3)};
   auto seat = Join(.1);
   TestWaiter waiter;
-  const auto computes = [&](const Frame& frame) {
+  const auto computes = [&](const LevelQueue::Frame& frame) {
     const std::uint64_t before = queue_->computed();
     queue_->Request(seat, frame, true, waiter);
     waiter.Wait();
     return queue_->computed() != before;
   };
   const std::uint64_t one = kLevelBytes + kPublishedBytes;
-  for (const Frame& frame : frames) EXPECT_TRUE(computes(frame));
+  for (const LevelQueue::Frame& frame : frames) EXPECT_TRUE(computes(frame));
   EXPECT_EQ(queue_->kept_bytes(), 2 * one);
   EXPECT_FALSE(computes(frames[2]));
   EXPECT_TRUE(computes(frames[0])) << "the oldest was dropped";
   frames.erase(frames.begin() + 1, frames.end());
-  const Frame newer = FrameOf(9);
+  const LevelQueue::Frame newer = FrameOf(9);
   EXPECT_TRUE(computes(newer));
   EXPECT_FALSE(computes(newer));
   seat = {};
@@ -226,7 +224,7 @@ TEST_F(LevelQueueTest, KeepsLevelsWithinItsBytesAndWhileTheirFramesExist) {
 }
 
 TEST_F(LevelQueueTest, WithoutMemoryWatchersThatMaySkipSkip) {
-  const Frame frame = FrameOf(1);
+  const LevelQueue::Frame frame = FrameOf(1);
   const auto seat = Join(.1);
   TestWaiter latest, every;
   Hold();
@@ -242,7 +240,7 @@ TEST_F(LevelQueueTest, WithoutMemoryWatchersThatMaySkipSkip) {
 // For ThreadSanitizer: watchers request and leave at any time.
 TEST_F(LevelQueueTest, RequestsOfManyThreadsAreNoRace) {
   std::vector<std::thread> threads;
-  const std::vector<Frame> frames = {FrameOf(1), FrameOf(2), FrameOf(3)};
+  const std::vector<LevelQueue::Frame> frames = {FrameOf(1), FrameOf(2), FrameOf(3)};
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
       for (int round = 0; round < 300; ++round) {

@@ -32,10 +32,8 @@ struct Pipe {
     EXPECT_EQ(pipe(ends), 0);
     EXPECT_GE(fcntl(ends[1], F_SETPIPE_SZ, 4096), 4096);
   }
-  ~Pipe() {
-    CloseReader();
-    close(ends[1]);
-  }
+  // Leaves the writer open: an abandoned thread may still use its number.
+  ~Pipe() { CloseReader(); }
   void CloseReader() {
     if (ends[0] >= 0) close(ends[0]);
     ends[0] = -1;
@@ -55,15 +53,15 @@ struct Pipe {
   int ends[2] = {-1, -1};
 };
 
-std::string Line(int k) { return "line " + std::to_string(k) + std::string(90, '.') + "\n"; }
+std::string LoggedLine(int k) { return "line " + std::to_string(k) + std::string(90, '.') + "\n"; }
 
 TEST(LogWriter, WritesWhatItIsGivenInItsOrder) {
   Pipe pipe;
   std::string expected;
   LogWriter writer({.file = pipe.ends[1]});
   for (int k = 0; k < 20; ++k) {
-    writer.Write(Line(k));
-    expected += Line(k);
+    writer.Write(LoggedLine(k));
+    expected += LoggedLine(k);
   }
   EXPECT_EQ(pipe.ReadUntil("line 19." + std::string(89, '.') + "\n"), expected);
   EXPECT_TRUE(writer.Flush(kPatience));
@@ -75,12 +73,12 @@ TEST(LogWriter, APipeThatNobodyReadsHoldsNobodyUpAndDropsAreCounted) {
   std::string text;
   {
     LogWriter writer({.file = pipe.ends[1], .capacity = 10'000});
-    for (int k = 0; k < 1000; ++k) writer.Write(Line(k));  // A hundred kilobytes.
+    for (int k = 0; k < 1000; ++k) writer.Write(LoggedLine(k));  // A hundred kilobytes.
     EXPECT_GE(writer.dropped(), 700u);
     EXPECT_FALSE(writer.Flush(milliseconds(20)));
     const std::uint64_t dropped = writer.dropped();
     text = pipe.ReadUntil("line 40.");
-    EXPECT_TRUE(Line(0) == text.substr(0, Line(0).size()));
+    EXPECT_TRUE(LoggedLine(0) == text.substr(0, LoggedLine(0).size()));
     std::thread reader([&] { text += pipe.ReadUntil("end\n"); });
     EXPECT_TRUE(writer.Flush(kPatience));
     writer.Write("end\n");
@@ -93,7 +91,7 @@ TEST(LogWriter, APipeThatNobodyReadsHoldsNobodyUpAndDropsAreCounted) {
 TEST(LogWriter, CanBeLeftWhileAPipeHoldsItsThread) {
   Pipe pipe;
   LogWriter writer({.file = pipe.ends[1]});
-  for (int k = 0; k < 1000; ++k) writer.Write(Line(k));
+  for (int k = 0; k < 1000; ++k) writer.Write(LoggedLine(k));
 }
 
 TEST(LogWriter, LinesThatWaitForAnAbandonedThreadAreCounted) {
@@ -102,7 +100,7 @@ TEST(LogWriter, LinesThatWaitForAnAbandonedThreadAreCounted) {
   writer.Write(std::string(100'000, 'x') + "\n");
   pollfd written{.fd = pipe.ends[0], .events = POLLIN, .revents = 0};
   ASSERT_EQ(poll(&written, 1, 60'000), 1);  // Now the full pipe blocks the thread.
-  writer.Write(Line(1));
+  writer.Write(LoggedLine(1));
   writer.Stop();
   EXPECT_EQ(writer.dropped(), 1u);
 }
@@ -111,7 +109,7 @@ TEST(LogWriter, AReaderThatHasGoneIsNoEnd) {
   Pipe pipe;
   LogWriter writer({.file = pipe.ends[1]});
   pipe.CloseReader();
-  writer.Write(Line(1));
+  writer.Write(LoggedLine(1));
   EXPECT_TRUE(writer.Flush(kPatience));
   EXPECT_EQ(writer.dropped(), 1u);
 }
@@ -119,11 +117,11 @@ TEST(LogWriter, AReaderThatHasGoneIsNoEnd) {
 TEST(LogWriter, ThatHasStoppedCountsWhatComesAsDropped) {
   Pipe pipe;
   LogWriter writer({.file = pipe.ends[1]});
-  writer.Write(Line(1));
+  writer.Write(LoggedLine(1));
   writer.Stop();
   writer.Stop();
   EXPECT_EQ(writer.dropped(), 0u);
-  writer.Write(Line(2));
+  writer.Write(LoggedLine(2));
   EXPECT_EQ(writer.dropped(), 1u);
   EXPECT_TRUE(writer.Flush(kPatience)) << "nothing waits";
 }
@@ -203,7 +201,7 @@ TEST(LoggingDeathTest, AnAbortHasWhatWasLoggedBeforeItWritten) {
   EXPECT_LOG(
       {
         FlushLogOnAbort();
-        for (int k = 0; k < 1'000; ++k) LogEvent(spdlog::level::info, Line(k), {});
+        for (int k = 0; k < 1'000; ++k) LogEvent(spdlog::level::info, LoggedLine(k), {});
         std::abort();
       },
       testing::KilledBySignal(SIGABRT), "line 999");
@@ -213,7 +211,7 @@ TEST(LoggingDeathTest, AnExitHasWhatWasLoggedBeforeItWritten) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_LOG(
       {
-        for (int k = 0; k < 1'000; ++k) LogEvent(spdlog::level::info, Line(k), {});
+        for (int k = 0; k < 1'000; ++k) LogEvent(spdlog::level::info, LoggedLine(k), {});
         exit(0);
       },
       testing::ExitedWithCode(0), "line 999");

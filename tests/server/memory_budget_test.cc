@@ -204,8 +204,8 @@ TEST(ReadPermits, SelectTheNextReadWhileCallersTakeAndGiveBack) {
   EXPECT_EQ(budget.reads().waiting(), 0u);
 }
 
-constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};
-constexpr std::size_t kWindow = 4;
+constexpr FrameLimits kFrameLimits{.max_particles = 2000, .max_tiles = 1000};
+constexpr std::size_t kBudgetWindow = 4;
 
 std::uint64_t FrameBytes() { return MovingBlob(1, 0).size() * sizeof(double); }
 
@@ -215,7 +215,7 @@ void SendAll(MemoryTransport& transport, std::uint64_t frames) {
   transport.HalfClose();
 }
 
-std::size_t ReceiveAll(MemoryTransport& transport) {
+std::size_t ReceiveFrames(MemoryTransport& transport) {
   std::size_t frames = 0;
   while (const auto answer = transport.Receive())
     frames += answer->what == Outgoing::kAnswer ? 1 : 0;
@@ -225,13 +225,13 @@ std::size_t ReceiveAll(MemoryTransport& transport) {
 TEST(MemoryOfStreams, WithoutAnyBudgetEveryStreamStillGoesOnFrameByFrame) {
   ComputePool pool(2);
   MemoryBudget budget(0);
-  MemoryTransport one(pool, budget, kWindow, BlobParameters(), kLimits);
-  MemoryTransport two(pool, budget, kWindow, BlobParameters(), kLimits);
+  MemoryTransport one(pool, budget, kBudgetWindow, BlobParameters(), kFrameLimits);
+  MemoryTransport two(pool, budget, kBudgetWindow, BlobParameters(), kFrameLimits);
   SendAll(one, 12);
   SendAll(two, 12);
   std::size_t of_two = 0;
-  std::thread other([&] { of_two = ReceiveAll(two); });
-  EXPECT_EQ(ReceiveAll(one), 12u);
+  std::thread other([&] { of_two = ReceiveFrames(two); });
+  EXPECT_EQ(ReceiveFrames(one), 12u);
   other.join();
   EXPECT_EQ(of_two, 12u);
   EXPECT_TRUE(one.status().ok() && two.status().ok());
@@ -245,12 +245,12 @@ TEST(MemoryOfStreams, WithoutAnyBudgetEveryStreamStillGoesOnFrameByFrame) {
 TEST(MemoryOfStreams, AStreamThatPinsTheBudgetStopsNobody) {
   ComputePool pool(2);
   MemoryBudget budget(FrameBytes() * 3);
-  MemoryTransport pinned(pool, budget, kWindow, BlobParameters(), kLimits);
-  MemoryTransport other(pool, budget, kWindow, BlobParameters(), kLimits);
+  MemoryTransport pinned(pool, budget, kBudgetWindow, BlobParameters(), kFrameLimits);
+  MemoryTransport other(pool, budget, kBudgetWindow, BlobParameters(), kFrameLimits);
   SendAll(pinned, 12);
   pinned.WaitUntilRead(3);
   SendAll(other, 30);
-  EXPECT_EQ(ReceiveAll(other), 30u);
+  EXPECT_EQ(ReceiveFrames(other), 30u);
   EXPECT_TRUE(other.status().ok());
   pinned.Cancel();
   EXPECT_EQ(pinned.status().code(), absl::StatusCode::kCancelled);
@@ -267,13 +267,13 @@ TEST(MemoryOfStreams, ManyStreamsThatShareLittleAllEndAndGiveEverythingBack) {
     std::vector<std::unique_ptr<MemoryTransport>> transports;
     std::vector<std::thread> clients;
     for (int i = 0; i < 6; ++i) {
-      transports.push_back(std::make_unique<MemoryTransport>(*pool, budget, 1 + random() % kWindow,
-                                                             BlobParameters(), kLimits));
+      transports.push_back(std::make_unique<MemoryTransport>(
+          *pool, budget, 1 + random() % kBudgetWindow, BlobParameters(), kFrameLimits));
       SendAll(*transports.back(), 8);
       clients.emplace_back([&transport = *transports.back(), fate = random() % 4] {
         if (fate == 0) return transport.Cancel();
         if (fate == 1) return transport.machine().Drain();
-        EXPECT_EQ(ReceiveAll(transport), 8u);
+        EXPECT_EQ(ReceiveFrames(transport), 8u);
       });
     }
     for (std::thread& client : clients) client.join();
@@ -289,8 +289,8 @@ TEST(MemoryOfStreams, KeepsTheSlotOfAFrameUntilTheFrameFits) {
   const std::uint64_t frame = FrameBytes();
   SteppedPool pool;
   MemoryBudget budget(2 * frame, {.reads = {.streams_beyond = 1, .message_bytes = frame}});
-  ScriptedTransport first(pool, budget, kWindow, BlobParameters(), kLimits);
-  ScriptedTransport second(pool, budget, kWindow, BlobParameters(), kLimits);
+  ScriptedTransport first(pool, budget, kBudgetWindow, BlobParameters(), kFrameLimits);
+  ScriptedTransport second(pool, budget, kBudgetWindow, BlobParameters(), kFrameLimits);
   budget.Take(2 * frame);
   for (ScriptedTransport* transport : {&first, &second}) {
     transport->BringRequest({.kind = RequestKind::kOpen, .positions = {}});

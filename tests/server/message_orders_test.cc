@@ -1,9 +1,8 @@
 // Streams with random orders of legal and illegal messages and events. Each step is compared with a
-// small model. PARTIEMC_ORDERS sets the number of orders: the default is for daily runs, 1000000
-// for a release. A failing order prints its seed; PARTIEMC_SEED starts from it.
+// small model. A release is tested with PARTIEMC_TRIES=250. A failing order prints its seed;
+// PARTIEMC_SEED starts from it.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <iostream>
 #include <limits>
 #include <map>
@@ -14,17 +13,13 @@
 #include "server/scripted_transport.h"
 #include "server/stream_model.h"
 #include "support/random.h"
+#include "support/tries.h"
 
 namespace partiemc::server {
 namespace {
 
-constexpr FrameLimits kLimits{.max_particles = 40, .max_tiles = 8};
+constexpr FrameLimits kSmallLimits{.max_particles = 40, .max_tiles = 8};
 constexpr std::size_t kMostSteps = 60;
-
-std::uint64_t NumberFromEnvironment(const char* name, std::uint64_t otherwise) {
-  const char* text = std::getenv(name);
-  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
-}
 
 ReconstructionParameters Parameters(bool legal) {
   return {
@@ -42,7 +37,7 @@ std::vector<double> GoodFrame(std::size_t index) {
 }
 
 std::vector<StreamModel::Digests> ResultsOfAnUndisturbedStream() {
-  auto session = Session::Open(Parameters(true), kLimits);
+  auto session = Session::Open(Parameters(true), kSmallLimits);
   Worker worker;
   std::vector<StreamModel::Digests> results;
   for (std::size_t k = 0; k < kMostSteps; ++k) {
@@ -53,11 +48,11 @@ std::vector<StreamModel::Digests> ResultsOfAnUndisturbedStream() {
 }
 
 // One order of events between a client, a network and a server, determined by one seed.
-class Order {
+class MessageOrder {
  public:
-  Order(std::uint64_t seed, SteppedPool& pool, MemoryBudget& budget,
-        const std::vector<StreamModel::Digests>& results, std::map<std::string, int>& seen,
-        ReachedStates& reached)
+  MessageOrder(std::uint64_t seed, SteppedPool& pool, MemoryBudget& budget,
+               const std::vector<StreamModel::Digests>& results, std::map<std::string, int>& seen,
+               ReachedStates& reached)
       : random_(seed),
         window_(1 + random_.Below(4)),
         legal_(!random_.Chance(0.03)),
@@ -66,7 +61,7 @@ class Order {
         seen_(seen),
         reached_(reached),
         model_(window_, legal_, results),
-        transport_(pool, budget, window_, Parameters(legal_), kLimits) {}
+        transport_(pool, budget, window_, Parameters(legal_), kSmallLimits) {}
 
   void Run() {
     ExpectAsPredicted("start");
@@ -157,7 +152,7 @@ class Order {
         frame.positions[random_.Below(18)] = std::numeric_limits<double>::quiet_NaN();
         return {frame, "NOT_FINITE"};
       case 1:
-        frame.positions.resize(2 * (kLimits.max_particles + 1));
+        frame.positions.resize(2 * (kSmallLimits.max_particles + 1));
         return {frame, "TOO_MANY_PARTICLES"};
       case 2:
         for (std::size_t k = 0; k < 18; ++k) frame.positions[k] *= 1000;
@@ -248,16 +243,16 @@ class Order {
 };
 
 TEST(MessageOrders, AreAnsweredAsTheModelSays) {
-  const std::uint64_t orders = NumberFromEnvironment("PARTIEMC_ORDERS", 4000);
-  const std::uint64_t first = NumberFromEnvironment("PARTIEMC_SEED", 1);
+  const std::uint64_t orders = support::Tries(4000u);
+  const std::uint64_t first = support::FirstSeed();
   const auto results = ResultsOfAnUndisturbedStream();
   SteppedPool pool;
   MemoryBudget budget(std::uint64_t{1} << 40);
   std::map<std::string, int> seen;
   ReachedStates reached;
   for (std::uint64_t seed = first; seed < first + orders; ++seed) {
-    SCOPED_TRACE(testing::Message() << "PARTIEMC_SEED=" << seed << " PARTIEMC_ORDERS=1");
-    Order(seed, pool, budget, results, seen, reached).Run();
+    SCOPED_TRACE(testing::Message() << "PARTIEMC_SEED=" << seed << " PARTIEMC_TRIES=0");
+    MessageOrder(seed, pool, budget, results, seen, reached).Run();
     EXPECT_EQ(budget.held(), 0u);
     if (HasFailure()) return;  // The first failure is enough.
   }

@@ -20,7 +20,7 @@ namespace {
 using AssemblerClock = FrameAssembler::Clock;
 using std::chrono::milliseconds;
 
-constexpr std::size_t kWindow = 3;
+constexpr std::size_t kPartsWindow = 3;
 constexpr std::uint64_t kMessage = 1000;
 constexpr milliseconds kTimeout(5000);
 
@@ -51,10 +51,10 @@ class Rank final : private StreamTransport, private StreamHandler {
         there_(there),
         part_(part),
         next_(first),
-        slots_(kWindow),
-        machine_(std::make_shared<StreamStateMachine>(static_cast<StreamTransport&>(*this),
-                                                      static_cast<StreamHandler&>(*this),
-                                                      world.pool.pool(), world.budget, kWindow)) {
+        slots_(kPartsWindow),
+        machine_(std::make_shared<StreamStateMachine>(
+            static_cast<StreamTransport&>(*this), static_cast<StreamHandler&>(*this),
+            world.pool.pool(), world.budget, kPartsWindow)) {
     machine_->Start();
     TakeReadSlot();
     machine_->ReadDone(RequestKind::kOpen, 1);
@@ -185,7 +185,7 @@ class Rank final : private StreamTransport, private StreamHandler {
   std::shared_ptr<StreamStateMachine> machine_;
 };
 
-struct Stream {
+struct PartsStream {
   std::shared_ptr<FrameAssembler> assembler;
   PartsThere there;
   std::vector<std::unique_ptr<Rank>> ranks;  // Part 0 first.
@@ -202,7 +202,7 @@ class Model {
         world_{pool, budget_} {
     const std::size_t streams = 1 + choose(4);
     for (std::size_t k = 0; k < streams; ++k) {
-      streams_.push_back(std::make_unique<Stream>());
+      streams_.push_back(std::make_unique<PartsStream>());
       Begin(*streams_.back(), 2 + static_cast<std::uint32_t>(choose(3)));
     }
   }
@@ -223,15 +223,15 @@ class Model {
     return kSizes[choose_(std::size(kSizes))];
   }
 
-  void Begin(Stream& stream, std::uint32_t parts) {
+  void Begin(PartsStream& stream, std::uint32_t parts) {
     stream.assembler = std::make_shared<FrameAssembler>(FrameAssembler::Terms{
-        .parts = parts, .window = kWindow, .max_frame_bytes = kMessage, .timeout = kTimeout});
+        .parts = parts, .window = kPartsWindow, .max_frame_bytes = kMessage, .timeout = kTimeout});
     stream.there.clear();
     for (auto& rank : stream.ranks) gone_.push_back(std::move(rank));
     stream.ranks.clear();
     for (std::uint32_t part = 0; part < parts; ++part) Connect(stream, part, 1);
   }
-  void Connect(Stream& stream, std::uint32_t part, std::uint64_t first) {
+  void Connect(PartsStream& stream, std::uint32_t part, std::uint64_t first) {
     auto rank = std::make_unique<Rank>(world_, stream.assembler, stream.there, part, first, Size());
     if (part < stream.ranks.size()) {
       gone_.push_back(std::exchange(stream.ranks[part], std::move(rank)));
@@ -241,7 +241,7 @@ class Model {
   }
 
   void Step() {
-    Stream& stream = *streams_[choose_(streams_.size())];
+    PartsStream& stream = *streams_[choose_(streams_.size())];
     const auto part = static_cast<std::uint32_t>(choose_(stream.ranks.size()));
     Rank& rank = *stream.ranks[part];
     const std::size_t dice = choose_(32);
@@ -267,7 +267,7 @@ class Model {
   }
 
   // A stream without part 0 restarts, like a client that resumes it.
-  void RestartIfOver(Stream& stream) {
+  void RestartIfOver(PartsStream& stream) {
     if (!stream.ranks[0]->finished()) return;
     for (auto& rank : stream.ranks) rank->Disconnect();
     world_.pool.Step();
@@ -307,7 +307,7 @@ class Model {
   }
 
   // True if anything has happened.
-  bool DrainOnce(Stream& stream, std::uint64_t last) {
+  bool DrainOnce(PartsStream& stream, std::uint64_t last) {
     bool moved = false;
     for (auto& other : streams_) {
       for (auto& rank : other->ranks) {
@@ -326,7 +326,7 @@ class Model {
     return moved;
   }
 
-  static bool IsFinished(const Stream& stream) {
+  static bool IsFinished(const PartsStream& stream) {
     return std::ranges::all_of(stream.ranks, [](const auto& rank) { return rank->finished(); });
   }
 
@@ -346,7 +346,7 @@ class Model {
   World world_;
   bool looked_ = false;
   std::vector<std::unique_ptr<Rank>> gone_;
-  std::vector<std::unique_ptr<Stream>> streams_;
+  std::vector<std::unique_ptr<PartsStream>> streams_;
 };
 
 }  // namespace

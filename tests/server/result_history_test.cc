@@ -15,7 +15,7 @@
 namespace partiemc::server {
 namespace {
 
-Published Frame(std::uint64_t number, std::size_t bytes = kFrameBytes) {
+Published PublishedFrame(std::uint64_t number, std::size_t bytes = kFrameBytes) {
   return {std::make_shared<NumberedFrame>(number, bytes), number, 10 * number};
 }
 
@@ -34,7 +34,7 @@ TEST(ResultHistory, KeepsAsManyOfTheNewestAsFitInTheirOrder) {
   std::uint64_t sum = 0;
   for (std::uint64_t number = 1; number <= 3000; ++number) {
     const std::size_t bytes = random() % 8 == 0 ? random() % 40'000 : random() % 3000;
-    history.Add(Frame(number, bytes));
+    history.Add(PublishedFrame(number, bytes));
     numbers.push_back(number), costs.push_back(bytes + kPublishedBytes);
     sum += costs.back();
     while (sum > kMost) {
@@ -50,7 +50,7 @@ TEST(ResultHistory, KeepsAsManyOfTheNewestAsFitInTheirOrder) {
 TEST(ResultHistory, ACopyHasTheNewestThatFitBeforeASequence) {
   HistoryRoom room(8 * kFrameCost, 11 * kFrameCost);
   ResultHistory history(room);
-  for (std::uint64_t number = 1; number <= 8; ++number) history.Add(Frame(number));
+  for (std::uint64_t number = 1; number <= 8; ++number) history.Add(PublishedFrame(number));
   const auto numbers = [&](std::uint64_t sequence) {
     return NumbersOf(*history.CopyBefore(sequence));
   };
@@ -64,21 +64,21 @@ TEST(ResultHistory, ACopyHasTheNewestThatFitBeforeASequence) {
   }
   const auto copy = history.CopyBefore(31);
   EXPECT_EQ(room.held(), 11 * kFrameCost);
-  copy->Add(Frame(4));
+  copy->Add(PublishedFrame(4));
   EXPECT_EQ(NumbersOf(*copy), (std::vector<std::uint64_t>{2, 3, 4}));
 }
 
 TEST(ResultHistory, FramesFromASequenceOnAreTaken) {
   HistoryRoom room(8 * kFrameCost, 8 * kFrameCost);
   ResultHistory history(room);
-  for (std::uint64_t number = 1; number <= 11; ++number) history.Add(Frame(number));
+  for (std::uint64_t number = 1; number <= 11; ++number) history.Add(PublishedFrame(number));
   EXPECT_TRUE(history.TakeFrom(999).empty());
   const auto taken = history.TakeFrom(61);
   ASSERT_EQ(taken.size(), 5u);
   EXPECT_EQ(taken.front().number, 7u);
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{4, 5, 6}));
   EXPECT_EQ(room.held(), 3 * kFrameCost);
-  for (std::uint64_t number = 7; number <= 11; ++number) history.Add(Frame(number));
+  for (std::uint64_t number = 7; number <= 11; ++number) history.Add(PublishedFrame(number));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{4, 5, 6, 7, 8, 9, 10, 11}));
   EXPECT_EQ(history.TakeFrom(0).size(), 8u);
   EXPECT_TRUE(history.empty());
@@ -87,11 +87,12 @@ TEST(ResultHistory, FramesFromASequenceOnAreTaken) {
 TEST(ResultHistory, HasNoHole) {
   HistoryRoom room(100 * kFrameCost, 100 * kFrameCost);
   ResultHistory history(room);
-  for (const std::uint64_t number : {1, 2, 3, 5}) history.Add(Frame(number));
+  for (const std::uint64_t number : {1, 2, 3, 5}) history.Add(PublishedFrame(number));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{5}));
-  history.Add(Frame(6, 101 * kFrameCost));  // Too large, so the next result has a gap before it.
+  history.Add(
+      PublishedFrame(6, 101 * kFrameCost));  // Too large, so the next result has a gap before it.
   EXPECT_TRUE(history.empty());
-  history.Add(Frame(7));
+  history.Add(PublishedFrame(7));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{7}));
 }
 
@@ -100,25 +101,26 @@ TEST(ResultHistory, ManyHaveEqualSharesAndNeverMoreThanThereIs) {
   ResultHistory first(room), second(room);
   EXPECT_FALSE(room.is_scarce());
   for (std::uint64_t number = 1; number <= 9; ++number) {
-    first.Add(Frame(number));
-    second.Add(Frame(number));
+    first.Add(PublishedFrame(number));
+    second.Add(PublishedFrame(number));
   }
   EXPECT_EQ(room.held(), 12 * kFrameCost);
   {
     ResultHistory third(room);
     EXPECT_TRUE(room.is_scarce());
     EXPECT_EQ(room.share(), 4 * kFrameCost);
-    third.Add(Frame(1));  // The others have not been notified yet.
+    third.Add(PublishedFrame(1));  // The others have not been notified yet.
     EXPECT_TRUE(third.empty());
     EXPECT_EQ(room.held(), 12 * kFrameCost);
     first.Shrink();
     EXPECT_EQ(NumbersOf(first), (std::vector<std::uint64_t>{6, 7, 8, 9}));
-    third.Add(Frame(2));
-    third.Add(Frame(3));
-    third.Add(Frame(4));  // The second still exceeds its share, so one of its results is dropped.
+    third.Add(PublishedFrame(2));
+    third.Add(PublishedFrame(3));
+    third.Add(PublishedFrame(
+        4));  // The second still exceeds its share, so one of its results is dropped.
     EXPECT_EQ(NumbersOf(third), (std::vector<std::uint64_t>{3, 4}));
     EXPECT_EQ(room.held(), 12 * kFrameCost);
-    second.Add(Frame(10));
+    second.Add(PublishedFrame(10));
     EXPECT_EQ(second.size(), 4u);
   }
   EXPECT_EQ(room.held(), 8 * kFrameCost);
@@ -130,7 +132,7 @@ TEST(ResultHistory, FindsTheFirstFromANumberOrASequenceOn) {
   ResultHistory history(room);
   EXPECT_EQ(history.FromNumber(0), nullptr);
   EXPECT_EQ(history.FromSequence(0), nullptr);
-  for (std::uint64_t number = 1; number <= 23; ++number) history.Add(Frame(number));
+  for (std::uint64_t number = 1; number <= 23; ++number) history.Add(PublishedFrame(number));
   for (std::uint64_t asked = 0; asked <= 22; ++asked) {
     const std::uint64_t first = std::max<std::uint64_t>(asked, 19);
     EXPECT_EQ(history.FromNumber(asked)->number, first);

@@ -17,9 +17,12 @@
 
 #include "partiemc/status.h"
 #include "server/moving_blob.h"
+#include "support/reason_of.h"
 
 namespace partiemc::server {
 namespace {
+
+using support::ReasonOf;
 
 constexpr unsigned kSeed = 20;
 
@@ -68,11 +71,6 @@ class Stream {
   Digests last_;
   std::size_t last_ring_count_ = 0;
 };
-
-std::string ReasonOf(const absl::Status& status) {
-  const auto violation = FindViolation(status);
-  return violation ? violation->reason : status.ToString();
-}
 
 TEST(Session, StartsWithOneAndGivesAResultWithRings) {
   Stream stream;

@@ -24,7 +24,7 @@ using std::chrono::seconds;
 using std::chrono::steady_clock;
 
 constexpr std::uint64_t kBudget = 1000;
-constexpr UnaryLimits kLimits{.request = seconds(30), .answer = seconds(120)};
+constexpr UnaryLimits kUnaryLimits{.request = seconds(30), .answer = seconds(120)};
 
 // A call driven by the test. Throws if the machine violates its contract.
 class ScriptedCall final : private UnaryTransport {
@@ -160,10 +160,10 @@ TEST(UnaryStateMachine, ACallWithoutARequestIsMalformed) {
 TEST(UnaryStateMachine, ARequestThatDoesNotComeInTimeEndsItAndIsToldWhy) {
   MemoryBudget budget(kBudget);
   ScriptedCall call(budget, nullptr);
-  const auto due = call.machine->EndIfIdle(kLimits, steady_clock::now());
-  EXPECT_LE(due, steady_clock::now() + kLimits.request);
+  const auto due = call.machine->EndIfIdle(kUnaryLimits, steady_clock::now());
+  EXPECT_LE(due, steady_clock::now() + kUnaryLimits.request);
   EXPECT_FALSE(call.finished);
-  call.machine->EndIfIdle(kLimits, due);
+  call.machine->EndIfIdle(kUnaryLimits, due);
   EXPECT_EQ(call.finished.value().code(), absl::StatusCode::kDeadlineExceeded);
   EXPECT_EQ(call.Reason(), kReasonIdle);
 }
@@ -173,9 +173,9 @@ TEST(UnaryStateMachine, AnAnswerThatIsNotTakenInTimeIsCutAndItsMemoryGivenBack) 
   ScriptedCall call(budget, nullptr);
   call.Bring(10);
   EXPECT_EQ(budget.held(), 300u);
-  call.machine->EndIfIdle(kLimits, steady_clock::now() + kLimits.request);
+  call.machine->EndIfIdle(kUnaryLimits, steady_clock::now() + kUnaryLimits.request);
   EXPECT_FALSE(call.cut) << "the time for the answer is its own";
-  call.machine->EndIfIdle(kLimits, steady_clock::now() + kLimits.answer);
+  call.machine->EndIfIdle(kUnaryLimits, steady_clock::now() + kUnaryLimits.answer);
   EXPECT_TRUE(call.cut);
   EXPECT_FALSE(call.finished) << "the write still goes on";
   call.EndWrite(false);
@@ -222,7 +222,9 @@ TEST(UnaryStateMachine, InAnyOrderItEndsOnceWithNothingHeld) {
     if (random() % 4 == 0) call.answer = random() % 1500;
     const std::vector<std::function<void()>> outside = {
         [&] { call.machine->Cancelled(); }, [&] { call.machine->GiveWay(DrainingError()); },
-        [&] { call.machine->EndIfIdle(kLimits, steady_clock::now() + seconds(random() % 200)); }};
+        [&] {
+          call.machine->EndIfIdle(kUnaryLimits, steady_clock::now() + seconds(random() % 200));
+        }};
     call.while_answering = [&] { reached.Add(call.machine->state()); };
     if (random() % 2 == 0) {
       call.while_answering = [&, happens = outside[random() % outside.size()]] {

@@ -78,9 +78,10 @@ class ScriptedWatch final : private WatchTransport {
   const WatchTerms terms_;
 };
 
-class Order {
+class WatchOrder {
  public:
-  Order(std::uint64_t seed, std::shared_ptr<ResultBroadcaster> broadcaster, ReachedStates& reached)
+  WatchOrder(std::uint64_t seed, std::shared_ptr<ResultBroadcaster> broadcaster,
+             ReachedStates& reached)
       : random_(seed),
         reached_(reached),
         watch_({.broadcaster = std::move(broadcaster),
@@ -170,7 +171,7 @@ TEST(WatchStates, RandomEventsReachLegalStatesOnly) {
   ReachedStates reached;
   for (std::uint64_t seed = 1; seed <= 20'000 && !testing::Test::HasFailure(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    Order(seed, broadcaster, reached).Run();
+    WatchOrder(seed, broadcaster, reached).Run();
   }
   reached.ExpectAllRowsOf(MachineKind::kWatch);
 }

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <random>
@@ -19,6 +18,7 @@
 #include "server/watch/watch_registry.h"
 #include "server/watch/watch_state_machine.h"
 #include "server/watch_fixture.h"
+#include "support/tries.h"
 
 namespace partiemc::server {
 namespace {
@@ -224,8 +224,7 @@ struct Reference {
 };
 
 TEST_F(WatchTest, RandomOrdersGiveWhatAPlainReferenceSays) {
-  const char* const asked = std::getenv("PARTIEMC_WATCH_ORDERS");
-  const int orders = asked != nullptr ? std::atoi(asked) : 3000;
+  const int orders = support::Tries(3000);
   std::uint64_t steps = 0, drops = 0, fell_behind = 0;
   for (int seed = 0; seed < orders; ++seed) {
     std::mt19937 random(static_cast<unsigned>(seed));
