@@ -134,7 +134,7 @@ bool CheckRandomFrame(std::uint64_t seed, SurfaceWorkspace& workspace) {
 
 TEST(SurfacePercolation, RandomFramesKeepTheGuarantees) {
   std::uint64_t with_cuts = 0;
-  const std::uint64_t frames = support::Tries(150u);
+  const std::uint64_t frames = support::Tries(60u);
   SurfaceWorkspace workspace;
   for (std::uint64_t seed = 1; seed <= frames && !HasFailure(); ++seed) {
     with_cuts += CheckRandomFrame(seed, workspace) ? 1 : 0;

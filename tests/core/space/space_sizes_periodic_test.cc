@@ -196,7 +196,7 @@ SpaceParticles RandomSizedInBox(double lengths, double largest, double ratio, Ra
 TEST(SpaceSizesPeriodic, RandomFramesKeepS1ToS5) {
   std::uint64_t cut = 0;
   SurfaceWorkspace workspace;
-  for (std::uint64_t seed = 1; seed <= support::Tries(60u); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(24u); ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     SurfaceParameters parameters = SizedInBox({});
@@ -220,7 +220,7 @@ TEST(SpaceSizesPeriodic, RandomFramesKeepS1ToS5) {
     EXPECT_LE(SumsOf(surface).particles, particles.size());
     cut += surface.cuts.empty() ? 0 : 1;
   }
-  EXPECT_GT(cut, support::Tries(60u) / 3);
+  EXPECT_GT(cut, support::Tries(24u) / 3);
 }
 
 TEST(SpaceSizesPeriodic, BitsDependNeitherOnThreadsNorOnOrder) {

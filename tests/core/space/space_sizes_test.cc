@@ -45,7 +45,7 @@ constexpr std::array kPlacements = {SurfacePlacement::kVirtualPlane,
 
 TEST(SpaceSizes, RandomFramesKeepS1ToS5) {
   std::uint64_t shells = 0;
-  for (std::uint64_t seed = 1; seed <= support::Tries(300u); ++seed) {
+  for (std::uint64_t seed = 1; seed <= support::Tries(100u); ++seed) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed);
     Random random(seed);
     SurfaceParameters parameters{.placement = kPlacements[seed % 3], .sizes = Sizes::kOwn};
@@ -61,7 +61,7 @@ TEST(SpaceSizes, RandomFramesKeepS1ToS5) {
     ASSERT_TRUE(status.ok()) << status;
     shells += surface.ShellCount();
   }
-  EXPECT_GT(shells, support::Tries(300u));
+  EXPECT_GT(shells, support::Tries(100u));
 }
 
 TEST(SpaceSizes, BitsOfSurfacesDependNeitherOnOrderNorOnThreads) {
