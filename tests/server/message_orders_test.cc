@@ -257,7 +257,7 @@ TEST(MessageOrders, AreAnsweredAsTheModelSays) {
     if (HasFailure()) return;  // The first failure is enough.
   }
   for (const auto& [what, count] : seen) std::cout << what << ": " << count << '\n';
-  if (orders < 1000) return;
+  if (orders < support::Tries(1000u)) return;
   std::cout << "states reached: " << reached.count() << '\n';
   reached.ExpectAllRowsOf(MachineKind::kStream);
   // All kinds of events must have occurred.

@@ -89,8 +89,8 @@ TEST(ResultHistory, HasNoHole) {
   ResultHistory history(room);
   for (const std::uint64_t number : {1, 2, 3, 5}) history.Add(PublishedFrame(number));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{5}));
-  history.Add(
-      PublishedFrame(6, 101 * kFrameCost));  // Too large, so the next result has a gap before it.
+  // Too large, so the next result has a gap before it.
+  history.Add(PublishedFrame(6, 101 * kFrameCost));
   EXPECT_TRUE(history.empty());
   history.Add(PublishedFrame(7));
   EXPECT_EQ(NumbersOf(history), (std::vector<std::uint64_t>{7}));
@@ -116,8 +116,8 @@ TEST(ResultHistory, ManyHaveEqualSharesAndNeverMoreThanThereIs) {
     EXPECT_EQ(NumbersOf(first), (std::vector<std::uint64_t>{6, 7, 8, 9}));
     third.Add(PublishedFrame(2));
     third.Add(PublishedFrame(3));
-    third.Add(PublishedFrame(
-        4));  // The second still exceeds its share, so one of its results is dropped.
+    // The second still exceeds its share, so one of its results is dropped.
+    third.Add(PublishedFrame(4));
     EXPECT_EQ(NumbersOf(third), (std::vector<std::uint64_t>{3, 4}));
     EXPECT_EQ(room.held(), 12 * kFrameCost);
     second.Add(PublishedFrame(10));

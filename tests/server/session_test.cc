@@ -26,7 +26,7 @@ using support::ReasonOf;
 
 constexpr unsigned kSeed = 20;
 
-// A session starts no thread. stream_state_machine_test tests the threads of the pool.
+// A session starts no thread. stream_state_machine_test.cc tests the threads of the pool.
 const oneapi::tbb::global_control one_thread(oneapi::tbb::global_control::max_allowed_parallelism,
                                              1);
 constexpr FrameLimits kLimits{.max_particles = 2000, .max_tiles = 1000};

@@ -13,9 +13,6 @@
 namespace partiemc {
 namespace {
 
-// The largest coordinate in world units: the largest number of cells times the largest spacing. Up
-// to this limit, squares of distances stay finite.
-
 // Largest distance of positions from their plane, relative to their extent in the plane. The limit
 // is above the rounding noise of simulators and far below the depth of particles that fill space.
 constexpr double kPlanarTolerance = 1e-5;

@@ -98,7 +98,8 @@ absl::Status InvalidFrame(std::string_view reason, std::string field, std::strin
 absl::Status InvalidParameter(std::string_view field, std::string value, std::string_view rule);
 absl::Status InvalidParameter(std::string_view field, double value, std::string_view rule);
 
-/// Limit of coordinates: squares and products of lengths stay finite.
+/// The largest coordinate, in world units: the largest number of cells times the largest spacing.
+/// Squares of distances stay finite.
 inline constexpr double kMaxCoordinate = 1e69;
 
 /// Limit of the names of attributes.

@@ -9,8 +9,6 @@
 namespace partiemc {
 namespace {
 
-// Number of items between two checks whether the frame is cancelled.
-
 bool AreEqual(const GridCell& a, const GridCell& b) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }

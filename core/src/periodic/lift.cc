@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "base/bits.h"
+#include "base/cancellation.h"
 #include "base/parallel.h"
 #include "frame/frame_view.h"
 #include "partiemc/status.h"

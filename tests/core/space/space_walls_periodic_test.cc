@@ -302,7 +302,7 @@ std::vector<WallPlane> WallsBeside(const PeriodicBox& box, const SpaceParticles&
 TEST(PeriodicWalls, RandomFramesKeepTheGuarantees) {
   SurfaceWorkspace workspace;
   std::uint64_t cut = 0, wetted = 0;
-  const std::uint64_t frames = support::Tries(32u);
+  const std::uint64_t frames = support::Tries(40u);
   for (std::uint64_t seed = 1; seed <= frames && !testing::Test::HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     Random random(104'729 * seed);
